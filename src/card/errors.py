@@ -18,7 +18,9 @@ class CardError(Exception):
         self.where = where
         self.found = found
         self.wanted = wanted
-        details = [f"{name} {value}" for name, value in (("found", found), ("wanted", wanted)) if value is not None]
+        details = [
+            f"{name} {value}" for name, value in (("found", found), ("wanted", wanted)) if value is not None
+        ]
         line = f"{where}: {what}" if where is not None else what
         if details:
             line += f" ({', '.join(details)})"

@@ -74,7 +74,9 @@ class CameraModel:
             if residual.size == 0 or residual.max() < UNDISTORT_TOLERANCE:
                 break
         if residual.size and not residual.max() < 1e-6:
-            raise CardError("distortion cannot be inverted", found=f"residual {residual.max():.2g}", wanted="< 1e-6")
+            raise CardError(
+                "distortion cannot be inverted", found=f"residual {residual.max():.2g}", wanted="< 1e-6"
+            )
         return np.concatenate([xy, np.ones((*xy.shape[:-1], 1))], axis=-1)
 
     def contains(self, pixels: ArrayLike) -> NDArray[np.bool_]:

@@ -66,7 +66,9 @@ class Trajectory:
     @classmethod
     def from_table(cls, table: Any) -> "Trajectory":
         """The trajectory of a table with the columns of schema ``trajectory``."""
-        columns = {name: np.asarray(table[name]) for name in ("t_ns", *TRANSLATION_COLUMNS, *ROTATION_COLUMNS)}
+        columns = {
+            name: np.asarray(table[name]) for name in ("t_ns", *TRANSLATION_COLUMNS, *ROTATION_COLUMNS)
+        }
         return cls(
             columns["t_ns"],
             np.stack([columns[name] for name in TRANSLATION_COLUMNS], axis=1),
@@ -82,7 +84,9 @@ class Trajectory:
         }
 
 
-def _slerp(q0: NDArray[np.float64], q1: NDArray[np.float64], alpha: NDArray[np.float64]) -> NDArray[np.float64]:
+def _slerp(
+    q0: NDArray[np.float64], q1: NDArray[np.float64], alpha: NDArray[np.float64]
+) -> NDArray[np.float64]:
     # Neighbours share a sign (see __init__), so the dot product is never negative.
     angle = np.arccos(np.clip(np.sum(q0 * q1, axis=-1, keepdims=True), -1.0, 1.0))
     small = angle < 1e-6

@@ -1,0 +1,91 @@
+"""JSON, YAML and sheets, each checked against its schema."""
+
+import csv
+import json
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from card.artifacts.atomic import atomic_file
+from card.artifacts.schemas import check, load_schema
+from card.errors import CardError
+
+
+def write_json(path: Path, document: Any, schema: str) -> None:
+    """Write a document that fits ``schema``: UTF-8, sorted keys, no NaN or infinity."""
+    plain = _plain(document, path)
+    check(plain, schema, path)
+    text = json.dumps(plain, indent=1, sort_keys=True, ensure_ascii=False, allow_nan=False)
+    with atomic_file(path) as partial:
+        partial.write_text(text + "\n", encoding="utf-8")
+
+
+def read_json(path: Path, schema: str) -> Any:
+    """Read a document and check it against ``schema``."""
+    try:
+        document = json.loads(_text(path))
+    except json.JSONDecodeError as error:
+        raise CardError("not JSON", where=f"{path}:{error.lineno}", found=error.msg) from error
+    check(document, schema, path)
+    return document
+
+
+def read_yaml(path: Path, schema: str) -> Any:
+    """Read a YAML document and check it against ``schema``."""
+    import yaml
+
+    try:
+        document = yaml.safe_load(_text(path))
+    except yaml.YAMLError as error:
+        raise CardError("not YAML", where=path, found=error) from error
+    check(document, schema, path)
+    return document
+
+
+def read_sheet(path: Path, schema: str) -> list[dict[str, str]]:
+    """Read a tab-separated sheet whose header is exactly the schema's properties; each row is checked.
+
+    The cells stay strings; lines that start with ``#`` are comments.
+    """
+    columns = list(load_schema(schema)["properties"])
+    lines = [
+        (n, line) for n, line in enumerate(_text(path).splitlines(), 1) if line and not line.startswith("#")
+    ]
+    if not lines:
+        raise CardError("sheet has no header", where=path, wanted="\\t".join(columns))
+    rows = list(csv.reader((line for _, line in lines), delimiter="\t"))
+    if rows[0] != columns:
+        raise CardError("wrong columns", where=path, found=rows[0], wanted=columns)
+    sheet = []
+    for (number, _), cells in zip(lines[1:], rows[1:], strict=True):
+        if len(cells) != len(columns):
+            raise CardError(
+                "wrong number of cells", where=f"{path}:{number}", found=len(cells), wanted=len(columns)
+            )
+        row = dict(zip(columns, cells, strict=True))
+        check(row, schema, f"{path}:{number}")
+        sheet.append(row)
+    return sheet
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except FileNotFoundError as error:
+        raise CardError("file is missing", where=path) from error
+    except UnicodeDecodeError as error:
+        raise CardError("not UTF-8", where=path, found=error.reason) from error
+
+
+def _plain(value: Any, path: Path) -> Any:
+    """Builtins of a value that may hold numpy scalars and arrays."""
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item, path) for key, item in value.items()}
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return [_plain(item, path) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        raise CardError("number is not finite", where=path, found=value)
+    return value
