@@ -66,7 +66,7 @@ def write_arrays(path: Path, arrays: Mapping[str, Any], schema: str) -> None:
     ):
         for name in load_schema(schema)["arrays"]:
             buffer = io.BytesIO()
-            np.save(buffer, np.ascontiguousarray(arrays[name]), allow_pickle=False)
+            np.save(buffer, np.asarray(arrays[name], order="C"), allow_pickle=False)
             info = zipfile.ZipInfo(f"{name}.npy", ZIP_EPOCH)
             info.compress_type = zipfile.ZIP_DEFLATED
             archive.writestr(info, buffer.getvalue())

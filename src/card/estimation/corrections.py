@@ -15,7 +15,7 @@ def correct_points(
     Parameters
     ----------
     ring : (N,) channel of each point, 0 at the top.
-    corrections : ``range_offset_m``, ``channel_range_offset_m`` [32], ``channel_elevation_offset_rad`` [32] and
+    corrections : ``range_offset_m``, ``channel_range_offset_m`` [32], ``channel_elevation_offset_rad`` [32],
         ``channel_azimuth_offset_rad`` [32] (clockwise seen from above), all added to the measured values.
     """
     horizontal = np.hypot(points[:, 0], points[:, 1])
