@@ -1,0 +1,41 @@
+"""How much of a drive is simulated: the same code from a test in seconds to a day's drive."""
+
+from dataclasses import dataclass
+
+from card.errors import CardError
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Sizes and durations of one scale.
+
+    width, height : image size, px.
+    columns : firings of all 32 channels a LiDAR revolution.
+    duration_s : time LiDARs and IMU run.
+    camera_start_s, camera_duration_s : the cameras' excerpt; they run at 10 Hz.
+    """
+
+    name: str
+    width: int
+    height: int
+    columns: int
+    duration_s: float
+    camera_start_s: float
+    camera_duration_s: float
+
+
+SCALES = {
+    scale.name: scale
+    for scale in (
+        Scale("tiny", 140, 140, 90, 6.0, 2.0, 0.5),
+        Scale("demo", 562, 563, 250, 45.0, 8.0, 5.0),
+        Scale("full", 2248, 2252, 2000, 120.0, 5.0, 80.0),
+    )
+}
+
+
+def scale_named(name: str) -> Scale:
+    """The scale ``tiny``, ``demo`` or ``full``; CardError for another name."""
+    if name not in SCALES:
+        raise CardError("unknown scale", found=name, wanted=" or ".join(SCALES))
+    return SCALES[name]
