@@ -1,0 +1,1 @@
+"""Hesai PandarXT-32: UDP packets to bursts and back."""
