@@ -78,7 +78,7 @@ def parse_packets(data: Sequence[bytes | memoryview | np.ndarray], where: object
             )
     packets = np.frombuffer(b"".join(bytes(p) for p in data), dtype=PACKET)
     for field, wanted in _WANTED.items():
-        differs = np.not_equal(packets[field], wanted).reshape(len(packets), -1).any(axis=1)
+        differs = (packets[field].reshape(len(packets), -1) != np.array(wanted)).any(axis=1)
         _refuse(differs, packets, field, wanted, where)
     modes = (*SINGLE_RETURN, DUAL_RETURN)
     _refuse(~np.isin(packets["return_mode"], modes), packets, "return_mode", [hex(m) for m in modes], where)
