@@ -1,0 +1,74 @@
+"""True and delivered calibrations of the sessions of a day."""
+
+import numpy as np
+import pytest
+
+from card.artifacts import check
+from card.errors import CardError
+from card.geometry import from_json
+from card.simulation.calibrations import delivered_calibration, true_calibration
+from card.simulation.rig import nominal_rig
+
+START, MID = "2026-04-14-start", "2026-04-14-mid"
+SENSORS = ("camera_left", "camera_right", "lidar_front", "lidar_rear")
+
+
+def _offset(a: dict, b: dict, sensor: str) -> np.ndarray:
+    """Translation (m) and rotation vector (rad) between two poses of a sensor, in the rig."""
+    one, other = (from_json(c["extrinsics"][f"rig_from_{sensor}"]) for c in (a, b))
+    turn = other[:3, :3] @ one[:3, :3].T
+    skew = 0.5 * (turn - turn.T)
+    return np.concatenate([other[:3, 3] - one[:3, 3], [skew[2, 1], skew[0, 2], skew[1, 0]]])
+
+
+@pytest.mark.parametrize("make", [true_calibration, lambda *a: delivered_calibration(*a, views=12)])
+def test_documents_fit_the_schema_and_repeat(make) -> None:
+    document = make(START, 3, "tiny")
+    check(document, "calibration", "calibration")
+    assert document == make(START, 3, "tiny")
+    assert document != make(START, 4, "tiny")
+
+
+def test_the_car_differs_from_its_drawing_and_drifts_far_less_between_sessions() -> None:
+    start, mid = true_calibration(START, 0, "demo"), true_calibration(MID, 0, "demo")
+    drawn = nominal_rig(562, 563)
+    for sensor in SENSORS:
+        drift = _offset(start, mid, sensor)
+        built = from_json(start["extrinsics"][f"rig_from_{sensor}"])[:3, 3] - drawn.rig_from[sensor][:3, 3]
+        assert 0 < np.abs(drift[:3]).max() < 6e-4
+        assert 0 < np.abs(drift[3:]).max() < np.radians(0.015)
+        assert np.abs(built).max() > np.abs(drift[:3]).max()
+    assert start["wheels"] == mid["wheels"]
+
+
+def test_the_errors_of_deliveries_have_the_covariance_they_state() -> None:
+    seeds = range(120)
+    truths = [true_calibration(START, seed, "tiny") for seed in seeds]
+    given = [delivered_calibration(START, seed, "tiny", views=3) for seed in seeds]
+    for sensor in SENSORS:
+        squares = []
+        for truth, bundle in zip(truths, given, strict=True):
+            error = _offset(truth, bundle, sensor)
+            squares.append(error @ np.linalg.solve(bundle["covariances"][f"rig_from_{sensor}"], error))
+        # Mean of 120 chi-squares with 6 degrees of freedom: 6 +- 4 standard errors.
+        assert np.mean(squares) == pytest.approx(6, abs=4 * np.sqrt(12 / 120)), sensor
+
+
+def test_stereo_is_known_far_better_than_each_camera() -> None:
+    errors = []
+    for seed in range(60):
+        relative = [
+            np.linalg.inv(from_json(c["extrinsics"]["rig_from_camera_left"]))
+            @ from_json(c["extrinsics"]["rig_from_camera_right"])
+            for c in (
+                true_calibration(START, seed, "tiny"),
+                delivered_calibration(START, seed, "tiny", views=3),
+            )
+        ]
+        errors.append(relative[1][:3, 3] - relative[0][:3, 3])
+    assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(3e-4, rel=0.25)
+
+
+def test_a_name_that_is_no_session_is_refused() -> None:
+    with pytest.raises(CardError, match=r"not a session \(found 2026-04-14-leica, wanted <day>-start"):
+        true_calibration("2026-04-14-leica", 0, "tiny")
