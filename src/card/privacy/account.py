@@ -1,0 +1,116 @@
+"""What was done to each image, and how well: the tables and the report of the privacy stage."""
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from card.artifacts import Figure, write_report
+from card.privacy.detection import Detection, Detector
+from card.privacy.recall import LabelledObject, recall_figures
+from card.privacy.redaction import Area
+
+
+@dataclass(frozen=True)
+class Job:
+    """One image to redact: where it is and where its redacted copy goes."""
+
+    camera: str
+    t_ns: int
+    source: Path
+    target: Path
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What happened to one image: size in pixels, boxes and the areas filled for them, output hash."""
+
+    width: int
+    height: int
+    detections: list[Detection]
+    areas: list[Area]
+    redacted_pixels: int
+    sha256: str
+
+
+def image_columns(
+    jobs: Sequence[Job], outcomes: Sequence[Outcome], folder: Path, detector: Detector
+) -> dict[str, list[Any]]:
+    """Columns of table ``images``."""
+    return {
+        "camera": [job.camera for job in jobs],
+        "t_ns": [job.t_ns for job in jobs],
+        "file": [job.target.relative_to(folder).as_posix() for job in jobs],
+        "width": [outcome.width for outcome in outcomes],
+        "height": [outcome.height for outcome in outcomes],
+        "redactions": [len(outcome.areas) for outcome in outcomes],
+        "redacted_pixels": [outcome.redacted_pixels for outcome in outcomes],
+        "sha256": [outcome.sha256 for outcome in outcomes],
+        "detector": [detector.name] * len(jobs),
+        "detector_version": [detector.version] * len(jobs),
+    }
+
+
+def redaction_columns(
+    jobs: Sequence[Job], outcomes: Sequence[Outcome], detector: Detector
+) -> dict[str, list[Any]]:
+    """Columns of table ``redactions``."""
+    rows = [
+        (job.camera, job.t_ns, box.kind, *area, box.score, box.source, detector.models[box.source])
+        for job, outcome in zip(jobs, outcomes, strict=True)
+        for box, area in zip(outcome.detections, outcome.areas, strict=True)
+    ]
+    names = ("camera", "t_ns", "kind", "x_min", "y_min", "x_max", "y_max", "score", "source", "model_sha256")
+    return {name: [row[index] for row in rows] for index, name in enumerate(names)}
+
+
+def write_account(
+    report: Path,
+    *,
+    sequence: str,
+    inputs: Mapping[str, Path],
+    labels: Sequence[LabelledObject],
+    settings: Mapping[str, Any],
+    gates: Sequence[Mapping[str, Any]],
+    jobs: Sequence[Job],
+    outcomes: Sequence[Outcome],
+) -> None:
+    """Write the stage's report, with recall where there are ``labels``."""
+    areas: dict[tuple[str, int], list[Area]] = defaultdict(list)
+    sizes = {}
+    for job, outcome in zip(jobs, outcomes, strict=True):
+        areas[job.camera, job.t_ns] += outcome.areas
+        sizes[job.camera, job.t_ns] = (outcome.width, outcome.height)
+    recall = recall_figures(
+        labels,
+        areas,
+        sizes,
+        covered_share_wanted=settings["covered_share"],
+        confidence=settings["confidence"],
+        where=inputs.get("privacy_labels"),
+    )
+    pixels = sum(outcome.width * outcome.height for outcome in outcomes)
+    share = 100 * sum(outcome.redacted_pixels for outcome in outcomes) / pixels
+    kinds = [box.kind for outcome in outcomes for box in outcome.detections]
+    write_report(
+        report,
+        stage="privacy",
+        sequence=sequence,
+        settings=settings,
+        inputs=inputs,
+        counts={
+            "images": len(jobs),
+            "faces_redacted": kinds.count("face"),
+            "plates_redacted": kinds.count("plate"),
+            "faces_labelled": sum(labelled.kind == "face" for labelled in labels),
+            "plates_labelled": sum(labelled.kind == "plate" for labelled in labels),
+        },
+        figures=[
+            *recall,
+            Figure("redacted_share_pct", share, "%", "Share of all pixels that were redacted."),
+        ],
+        gates=gates,
+        overrides=settings["overrides"],
+        notes=[] if labels else ["No labelled faces or plates: recall is unknown."],
+    )
