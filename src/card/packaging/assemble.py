@@ -1,0 +1,190 @@
+"""Stage `release`: the packages of one licence as a complete tree."""
+
+import os
+import shutil
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from card.artifacts import (
+    atomic_folder,
+    read_json,
+    read_table,
+    sha256_file,
+    write_json,
+    write_report,
+    write_table,
+)
+from card.errors import CardError
+from card.packaging.croissant import croissant
+from card.packaging.metadata import write_metadata
+from card.packaging.mini import mini_columns
+from card.packaging.pages import SPLITS, write_pages
+from card.packaging.reader import Release
+
+SHIPPED_SCHEMAS = (
+    "calibration",
+    "imu",
+    "poses",
+    "provenance",
+    "quality",
+    "release",
+    "release_frames",
+    "release_members",
+    "release_mini",
+    "release_sequences",
+    "retractions",
+    "road_planes",
+    "wheel_excitation",
+)
+
+
+def assemble(
+    *,
+    repository: str,
+    spdx: str,
+    terms: Mapping[str, Any],
+    sequences: Sequence[Mapping[str, Any]],
+    release_folder: Path,
+    schemas: Path,
+    out: Path,
+    report: Path,
+    settings: Mapping[str, Any],
+    gates: Sequence[Mapping[str, Any]],
+) -> None:
+    """Build the tree `out` from packages; it replaces an older one whole.
+
+    Parameters
+    ----------
+    spdx, terms : the tree's licence and its entry of `config/licenses.yaml`.
+    sequences : {id, package, splits} each: a package folder and the table of splits, None without frames.
+    release_folder : templates and licence texts; schemas : folder of the schemas that ship with the tree.
+
+    CardError when anything in a package is under another licence than the tree.
+    """
+    ordered = sorted(sequences, key=lambda item: item["id"])
+    with atomic_folder(out) as tree:
+        hashes: dict[str, str] = {}
+        for item in ordered:
+            _check_license(item["id"], Path(item["package"]), spdx)
+            hashes |= _place(item["id"], Path(item["package"]), tree)
+        rows = [read_json(Path(item["package"]) / "sequence.json", "release_sequence") for item in ordered]
+        frames = write_metadata(tree, ordered, rows)
+        mini = mini_columns(Release(tree), frames, settings["mini_frames"], settings["mini_side_px"])
+        write_table(tree / "mini" / "mini.parquet", mini, "release_mini")
+        (tree / "schemas").mkdir()
+        for name in SHIPPED_SCHEMAS:
+            shutil.copyfile(schemas / f"{name}.schema.json", tree / "schemas" / f"{name}.schema.json")
+
+        about = settings["release"]
+        document = {
+            "schema": "release",
+            "repository": repository,
+            "version": about["version"],
+            "date": about["date"],
+            "spdx": spdx,
+            "commercial": terms["commercial"],
+            "sequences": [item["id"] for item in ordered],
+            "frames": {split: sum(row["split"] == split for row in frames) for split in SPLITS},
+            "files": sum(row["files"] for row in rows),
+            "bytes": sum(row["bytes"] for row in rows),
+            "overrides": _overrides(tree, [item["id"] for item in ordered]),
+        }
+        write_json(tree / "release.json", document, "release")
+        write_pages(
+            tree, templates=release_folder, release=document, sequences=rows, terms=terms, about=about
+        )
+        hashes |= _hash_rest(tree, hashes)
+        write_json(tree / "croissant.json", croissant(document, terms, about, hashes), "croissant")
+        hashes["croissant.json"] = sha256_file(tree / "croissant.json")
+        sums = "".join(f"{sha256}  {path}\n" for path, sha256 in sorted(hashes.items()))
+        (tree / "SHA256SUMS").write_text(sums, encoding="utf-8")
+
+    write_report(
+        report,
+        stage="release",
+        settings=settings,
+        inputs={"checksums": out / "SHA256SUMS"}
+        | {f"package_{item['id']}": Path(item["package"]) / "inventory.parquet" for item in ordered},
+        counts={
+            "sequences": len(rows),
+            "frames": len(frames),
+            "files": document["files"],
+            "bytes": document["bytes"],
+            "tree_files": len(hashes) + 1,
+            **{f"frames_{split}": count for split, count in document["frames"].items()},
+        },
+        gates=gates,
+        notes=[
+            f"{item['id']}: no row in the split ledger; run `snakemake assign_splits`"
+            for item in ordered
+            if _outside_ledger(frames, item["id"])
+        ],
+    )
+
+
+def _check_license(sequence: str, package: Path, spdx: str) -> None:
+    """The firewall: every statement of a licence in the package must name the tree's."""
+    stated = {
+        "sequence.json": {read_json(package / "sequence.json", "release_sequence")["spdx"]},
+        "provenance.json": {read_json(package / "sidecars" / "provenance.json", "provenance")["spdx"]},
+        "members.parquet": set(
+            read_table(package / "members.parquet", "release_members")["spdx"].to_pylist()
+        ),
+        "frames.parquet": set(read_table(package / "frames.parquet", "package_frames")["spdx"].to_pylist()),
+    }
+    for name, found in stated.items():
+        if found - {spdx}:
+            raise CardError(
+                "file under another licence than the tree",
+                where=f"sequence {sequence}, {name}",
+                found=", ".join(sorted(found - {spdx})),
+                wanted=spdx,
+            )
+
+
+def _place(sequence: str, package: Path, tree: Path) -> dict[str, str]:
+    """Link (or copy) a package's shards and sidecars into the tree; return their recorded hashes."""
+    listed = read_table(package / "inventory.parquet", "inventory").to_pydict()
+    hashes = {}
+    for name, sha256 in zip(listed["name"], listed["sha256"], strict=True):
+        folder, _, rest = name.partition("/")
+        if folder not in ("data", "sidecars"):
+            continue
+        path = f"{'data' if folder == 'data' else 'sequences'}/{sequence}/{rest}"
+        target = tree / path
+        target.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            os.link(package / name, target)
+        except OSError:  # another file system, or one without hard links
+            shutil.copyfile(package / name, target)
+        hashes[path] = sha256
+    return hashes
+
+
+def _overrides(tree: Path, sequences: Sequence[str]) -> list[dict[str, str]]:
+    return [
+        {
+            "sequence": sequence,
+            "stage": stage,
+            **{name: gate[name] for name in ("figure", "signed_by", "reason")},
+        }
+        for sequence in sequences
+        for stage, stated in read_json(tree / "sequences" / sequence / "quality.json", "quality")[
+            "stages"
+        ].items()
+        for gate in stated["gates"]
+        if gate["verdict"] == "overridden"
+    ]
+
+
+def _hash_rest(tree: Path, known: Mapping[str, str]) -> dict[str, str]:
+    files = (path.relative_to(tree).as_posix() for path in tree.rglob("*") if path.is_file())
+    return {path: sha256_file(tree / path) for path in sorted(files) if path not in known}
+
+
+def _outside_ledger(frames: Sequence[Mapping[str, Any]], sequence: str) -> bool:
+    return any(
+        row["sequence"] == sequence and row["split"] == "unassigned" and row["group"] is None
+        for row in frames
+    )

@@ -1,0 +1,60 @@
+"""The tables under `metadata/` of a release tree."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from card.artifacts import load_schema, read_table, write_table
+from card.errors import CardError
+from card.packaging.pages import SPLITS
+
+SPLIT_COLUMNS = ("split", "group", "stratum", "sampled")
+
+
+def write_metadata(
+    tree: Path, sequences: Sequence[Mapping[str, Any]], rows: Sequence[Mapping[str, Any]]
+) -> list[dict[str, Any]]:
+    """Write all tables under `metadata/`; return the rows of the frame tables."""
+    import pyarrow as pa
+
+    folder = tree / "metadata"
+    write_table(
+        folder / "sequences.parquet",
+        {name: [row[name] for row in rows] for name in load_schema("release_sequences")["columns"]},
+        "release_sequences",
+    )
+    members = [read_table(Path(item["package"]) / "members.parquet", "release_members") for item in sequences]
+    empty: dict[str, list[object]] = {name: [] for name in load_schema("release_members")["columns"]}
+    write_table(
+        folder / "members.parquet", pa.concat_tables(members) if members else empty, "release_members"
+    )
+    write_table(
+        folder / "retractions.parquet",
+        {name: [] for name in load_schema("retractions")["columns"]},
+        "retractions",
+    )
+    frames = [row for item in sequences for row in _frames_with_split(item)]
+    for split in SPLITS:
+        chosen = [row for row in frames if row["split"] == split]
+        columns = {name: [row[name] for row in chosen] for name in load_schema("release_frames")["columns"]}
+        write_table(folder / f"frames-{split}.parquet", columns, "release_frames")
+    return frames
+
+
+def _frames_with_split(item: Mapping[str, Any]) -> list[dict[str, Any]]:
+    frames: list[dict[str, Any]] = read_table(
+        Path(item["package"]) / "frames.parquet", "package_frames"
+    ).to_pylist()
+    splits = (
+        {row["frame"]: row for row in read_table(Path(item["splits"]), "splits").to_pylist()}
+        if item["splits"]
+        else {}
+    )
+    if set(splits) != {row["frame"] for row in frames}:
+        raise CardError(
+            "splits and package have different frames",
+            where=f"sequence {item['id']}",
+            found=f"{len(splits)} splits",
+            wanted=f"{len(frames)} frames",
+        )
+    return [row | {name: splits[row["frame"]][name] for name in SPLIT_COLUMNS} for row in frames]

@@ -1,0 +1,122 @@
+"""The files of each modality of a sequence, named as members of its shards."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from card.artifacts import read_table
+from card.errors import CardError
+from card.packaging.shards import Source
+
+CAMERAS = ("camera_left", "camera_right")
+LIDARS = ("lidar_front", "lidar_rear")
+EXTENSIONS = {
+    "camera_left": "jpg",
+    "camera_right": "jpg",
+    "lidar_front": "laz",
+    "lidar_rear": "laz",
+    "ground_truth": "npz",
+    "labels": "txt",
+}
+MODALITIES = tuple(EXTENSIONS)
+
+Rows = Sequence[Mapping[str, Any]]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One member to be: its source and the frame or burst it belongs to."""
+
+    source: Source
+    frame: int | None
+    burst: int | None
+
+
+def member_name(sequence: str, number: int, modality: str) -> str:
+    """Name of a member; `number` is a burst for the LiDARs and a frame for all others."""
+    return f"{sequence}/{number:06d}.{modality}.{EXTENSIONS[modality]}"
+
+
+def image_entries(sequence: str, camera: str, frames: Rows, anonymized: Path) -> list[Entry]:
+    """Anonymized images of one camera.
+
+    An image gets in only if `anonymized/images.parquet` lists it, and only with the bytes whose hash
+    stands there; any other is a CardError.
+    """
+    listed = {
+        (row["camera"], row["t_ns"]): row
+        for row in read_table(anonymized / "images.parquet", "images").to_pylist()
+    }
+    side = camera.removeprefix("camera_")
+    entries = []
+    for row in frames:
+        if row[f"{side}_file"] is None:
+            continue
+        t_ns = row["t_ns"] if side == "left" else row["right_t_ns"]
+        image = listed.get((camera, t_ns))
+        if image is None:
+            raise CardError(
+                "image was not anonymized",
+                where=f"sequence {sequence}, frame {row['frame']}, {camera}",
+                found=f"no row for t_ns {t_ns} in {anonymized / 'images.parquet'}",
+            )
+        name = member_name(sequence, row["frame"], camera)
+        entries.append(Entry(Source(name, anonymized / image["file"], image["sha256"]), row["frame"], None))
+    return entries
+
+
+def burst_entries(
+    sequence: str, lidar: str, bursts: Rows, folder: Path, hashes: Mapping[str, str]
+) -> list[Entry]:
+    """Raw bursts of one LiDAR, byte for byte; `hashes` are the recording's, by relative name."""
+    entries = []
+    for row in bursts:
+        if row["lidar"] != lidar:
+            continue
+        path = folder / Path(row["file"]).name
+        source = Source(member_name(sequence, row["burst"], lidar), path, hashes.get(f"{lidar}/{path.name}"))
+        entries.append(Entry(source, None, row["burst"]))
+    return entries
+
+
+def ground_truth_entries(sequence: str, frames: Rows, folder: Path) -> list[Entry]:
+    """Ground truth of the frames that have one, with the hashes its stage recorded."""
+    hashes = dict(_inventory(folder))
+    return [
+        Entry(
+            Source(member_name(sequence, row["frame"], "ground_truth"), folder / name, hashes[name]),
+            row["frame"],
+            None,
+        )
+        for row in frames
+        if (name := f"{row['frame']:06d}.npz") in hashes
+    ]
+
+
+def label_entries(sequence: str, states: Rows, labels: Rows, classes: Sequence[str]) -> list[Entry]:
+    """YOLO label files: one for each reviewed frame, empty where nothing was found.
+
+    A frame that was not reviewed has no file: its `label_state` says so. `classes` gives the ids.
+    """
+    lines: dict[int, list[str]] = {}
+    for box in labels:
+        values = (box[name] for name in ("x_center", "y_center", "width", "height"))
+        text = " ".join(repr(float(value)) for value in values)
+        lines.setdefault(box["frame"], []).append(f"{classes.index(box['class'])} {text}\n")
+    return [
+        Entry(
+            Source(
+                member_name(sequence, row["frame"], "labels"), "".join(lines.get(row["frame"], ())).encode()
+            ),
+            row["frame"],
+            None,
+        )
+        for row in states
+        if row["state"] != "not_reviewed"
+    ]
+
+
+def _inventory(folder: Path) -> list[tuple[str, str]]:
+    table = read_table(folder / "inventory.parquet", "inventory").to_pydict()
+    return list(zip(table["name"], table["sha256"], strict=True))

@@ -1,0 +1,205 @@
+"""Stage `package`: one sequence as shards, tables and sidecars, without its split."""
+
+import shutil
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from card.artifacts import (
+    Figure,
+    atomic_folder,
+    inventory,
+    read_json,
+    read_table,
+    sha256_file,
+    write_json,
+    write_report,
+    write_table,
+)
+from card.packaging.frame_rows import frame_columns
+from card.packaging.modalities import (
+    CAMERAS,
+    LIDARS,
+    Entry,
+    burst_entries,
+    ground_truth_entries,
+    image_entries,
+    label_entries,
+)
+from card.packaging.quality import gather_quality
+from card.packaging.sequence_row import sequence_document
+from card.packaging.shards import write_shards
+
+Settings = Mapping[str, Any]
+
+
+def pack_sequence(
+    *,
+    sequence: Mapping[str, Any],
+    spdx: str,
+    frames: Path,
+    bursts: Path,
+    recording_inventory: Path,
+    lidar_front: Path | None,
+    lidar_rear: Path | None,
+    imu: Path | None,
+    calibration: Path | None,
+    trajectory: Path | None,
+    poses: Path | None,
+    wheel_excitation: Path | None,
+    road_planes: Path | None,
+    ground_truth: Path | None,
+    anonymized: Path | None,
+    labels: Path | None,
+    label_states: Path | None,
+    reports: Mapping[str, Path],
+    out: Path,
+    report: Path,
+    settings: Settings,
+    gates: Sequence[Mapping[str, Any]],
+) -> None:
+    """Pack one sequence into the folder `out`; what it lacks (None) is left out.
+
+    Raw images are not among the inputs, and no split is: a package stays as it is when splits change.
+
+    Parameters
+    ----------
+    sequence : row of the sequence sheet.
+    spdx : licence of every file of this sequence.
+    recording_inventory : names and hashes of the raw recording.
+    trajectory : gives the length of the drive and is not packed; `poses` holds what users need.
+    lidar_front, lidar_rear : folders of raw bursts; ground_truth, anonymized : folders of their stages.
+    reports : stage -> report of every stage this package stands on.
+
+    CardError for an image that was not anonymized, content that differs from the hash its stage
+    recorded, a failed gate (see `quality`), and artifacts that break their schema.
+    """
+    quality = gather_quality(sequence["id"], reports)
+    frame_table = read_table(frames, "frames")
+    frame_rows = frame_table.to_pylist()
+    lidars = {"lidar_front": lidar_front, "lidar_rear": lidar_rear}
+    states = read_table(label_states, "label_states").to_pylist() if label_states else []
+    boxes = read_table(labels, "labels").to_pylist() if labels else []
+    raw = read_table(recording_inventory, "inventory").to_pydict()
+    hashes = dict(zip(raw["name"], raw["sha256"], strict=True))
+
+    entries: dict[str, list[Entry]] = {}
+    if anonymized:
+        entries |= {
+            camera: image_entries(sequence["id"], camera, frame_rows, anonymized) for camera in CAMERAS
+        }
+    burst_rows = read_table(bursts, "bursts").to_pylist()
+    for lidar in LIDARS:
+        folder = lidars[lidar]
+        if folder:
+            entries[lidar] = burst_entries(sequence["id"], lidar, burst_rows, folder, hashes)
+    if ground_truth:
+        entries["ground_truth"] = ground_truth_entries(sequence["id"], frame_rows, ground_truth)
+    if label_states:
+        entries["labels"] = label_entries(sequence["id"], states, boxes, settings["classes"])
+
+    sidecars = {
+        "calibration.json": (calibration, "calibration"),
+        "poses.json": (poses, "poses"),
+        "wheel_excitation.json": (wheel_excitation, "wheel_excitation"),
+        "road_planes.parquet": (road_planes, "road_planes"),
+        "imu.parquet": (imu, "imu"),
+    }
+    files = {
+        "frames": frames,
+        "bursts": bursts,
+        "recording": recording_inventory,
+        "labels": labels,
+        "label_states": label_states,
+        "trajectory": trajectory,
+        "ground_truth": ground_truth / "inventory.parquet" if ground_truth else None,
+        "anonymized": anonymized / "inventory.parquet" if anonymized else None,
+        **{Path(name).stem: path for name, (path, _) in sidecars.items()},
+    }
+    sources = {name: path for name, path in files.items() if path is not None}
+
+    with atomic_folder(out) as folder:
+        members = _write_members(folder, sequence["id"], spdx, entries, settings)
+        coverage = (
+            read_table(ground_truth / "coverage.parquet", "coverage").to_pylist() if ground_truth else []
+        )
+        columns = frame_columns(sequence, spdx, frame_rows, entries, states, boxes, coverage)
+        write_table(folder / "frames.parquet", columns, "package_frames")
+        (folder / "sidecars").mkdir()
+        for name, (path, schema) in sidecars.items():
+            if path is not None:
+                (read_json if path.suffix == ".json" else read_table)(path, schema)
+                shutil.copyfile(path, folder / "sidecars" / name)
+        write_json(folder / "sidecars" / "quality.json", quality, "quality")
+        provenance = {
+            "schema": "provenance",
+            "sequence": sequence["id"],
+            "country": sequence["country"],
+            "spdx": spdx,
+            "sources": {name: sha256_file(path) for name, path in sorted(sources.items())},
+        }
+        write_json(folder / "sidecars" / "provenance.json", provenance, "provenance")
+        distance_m = _distance(trajectory) if trajectory else None
+        document = sequence_document(sequence, spdx, columns, members, burst_rows, distance_m)
+        write_json(folder / "sequence.json", document, "release_sequence")
+        write_table(folder / "inventory.parquet", inventory(folder), "inventory")
+
+    write_report(
+        report,
+        stage="packaging",
+        sequence=sequence["id"],
+        settings=settings,
+        inputs=sources,
+        counts={f"{modality}_files": len(found) for modality, found in entries.items()}
+        | {"frames": len(frame_rows), "files": len(members["file"]), "bytes": sum(members["size"])},
+        figures=[
+            Figure(
+                "unreviewed_frames",
+                len(frame_rows) - len(entries.get("labels", ())),
+                "frames",
+                "Frames whose labels nobody has reviewed",
+            )
+        ],
+        gates=gates,
+    )
+
+
+def _write_members(
+    folder: Path, sequence: str, spdx: str, entries: Mapping[str, Sequence[Entry]], settings: Settings
+) -> dict[str, list[Any]]:
+    """Write the shards and `members.parquet`; shard paths are those of the release tree."""
+    (folder / "data").mkdir()
+    names = ("file", "sequence", "modality", "frame", "burst", "shard", "offset", "size", "sha256", "spdx")
+    columns: dict[str, list[Any]] = {name: [] for name in names}
+    for modality, found in sorted(entries.items()):
+        by_name = {entry.source.name: entry for entry in found}
+        members = write_shards(
+            (entry.source for entry in found), folder / "data", modality, settings["shard_max_bytes"]
+        )
+        for member in members:
+            entry = by_name[member.name]
+            row = (
+                member.name,
+                sequence,
+                modality,
+                entry.frame,
+                entry.burst,
+                f"data/{sequence}/{member.shard}",
+                member.offset,
+                member.size,
+                member.sha256,
+                spdx,
+            )
+            for name, value in zip(names, row, strict=True):
+                columns[name].append(value)
+    write_table(folder / "members.parquet", columns, "release_members")
+    return columns
+
+
+def _distance(trajectory: Path) -> float:
+    """Length of the track, m."""
+    table = read_table(trajectory, "trajectory")
+    track = np.stack([table[axis].to_numpy() for axis in "xyz"], axis=1)
+    return float(np.linalg.norm(np.diff(track, axis=0), axis=1).sum())

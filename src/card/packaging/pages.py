@@ -1,0 +1,150 @@
+"""The pages of a release tree, filled from the templates in `release/`."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from string import Template
+from typing import Any
+
+import yaml
+
+from card.errors import CardError
+
+SPLITS = ("train", "validation", "test", "zero_shot", "unassigned")
+COPIED = ("CONVENTIONS.md", "CHANGELOG.md")
+FILLED = ("README.md", "NOTICE", "CITATION.cff", "TAKEDOWN.md")
+SIZES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"))
+
+
+def write_pages(
+    tree: Path,
+    *,
+    templates: Path,
+    release: Mapping[str, Any],
+    sequences: Sequence[Mapping[str, Any]],
+    terms: Mapping[str, Any],
+    about: Mapping[str, str],
+) -> None:
+    """Write all pages into `tree`.
+
+    Parameters
+    ----------
+    templates : folder `release/`.
+    release : document `release`; sequences : rows of the sequence table.
+    terms : the licence's entry of `config/licenses.yaml`.
+    about : title, creator, contact and url from the settings.
+    """
+    values = {
+        **about,
+        "repository": release["repository"],
+        "version": release["version"],
+        "date": release["date"],
+        "year": release["date"][:4],
+        "spdx": release["spdx"],
+        "license_name": terms["name"],
+        "license_url": terms["url"],
+        "attribution": terms["attribution"],
+        "commercial": "Commercial use is permitted."
+        if terms["commercial"]
+        else "Commercial use is not permitted.",
+        "front_matter": yaml.safe_dump(front_matter(release, about["title"]), sort_keys=False),
+        "counts": _counts(release, sequences),
+        "split_table": _table(("split", "frames"), [(split, release["frames"][split]) for split in SPLITS]),
+        "sequence_table": _table(
+            (
+                "sequence",
+                "place",
+                "road type",
+                "frames",
+                "reviewed",
+                "positive",
+                "negative",
+                "seconds",
+                "metres",
+            ),
+            [_sequence_cells(row) for row in sequences],
+        ),
+        "known_issues": _known_issues(release, sequences),
+    }
+    for name in FILLED:
+        template = templates / f"{name}.tmpl"
+        try:
+            text = Template(template.read_text(encoding="utf-8")).substitute(values)
+        except (KeyError, ValueError) as error:
+            raise CardError("template asks for an unknown value", where=template, found=error) from error
+        (tree / name).write_text(text, encoding="utf-8")
+    for name in COPIED:
+        (tree / name).write_bytes((templates / name).read_bytes())
+    (tree / "LICENSE").write_bytes((templates / "licenses" / terms["text"]).read_bytes())
+
+
+def front_matter(release: Mapping[str, Any], title: str) -> dict[str, Any]:
+    """YAML of the dataset card: Parquet configs only, each with its files by name."""
+    frames = sum(release["frames"].values())
+    return {
+        "pretty_name": title,
+        "license": release["spdx"].lower(),
+        "task_categories": ["depth-estimation", "object-detection"],
+        "tags": ["autonomous-driving", "road-topography", "lidar", "stereo"],
+        "size_categories": [next((name for limit, name in SIZES if frames < limit), "n>1M")],
+        "configs": [
+            {
+                "config_name": "frames",
+                "default": True,
+                "data_files": [
+                    {"split": split, "path": f"metadata/frames-{split}.parquet"} for split in SPLITS
+                ],
+            },
+            {
+                "config_name": "sequences",
+                "data_files": [{"split": "all", "path": "metadata/sequences.parquet"}],
+            },
+            {"config_name": "members", "data_files": [{"split": "all", "path": "metadata/members.parquet"}]},
+            {"config_name": "mini", "data_files": [{"split": "all", "path": "mini/mini.parquet"}]},
+        ],
+    }
+
+
+def _counts(release: Mapping[str, Any], sequences: Sequence[Mapping[str, Any]]) -> str:
+    seconds = sum(row["t_end_ns"] - row["t_start_ns"] for row in sequences) / 1e9
+    metres = sum(row["distance_m"] or 0 for row in sequences)
+    places = len({row["place"] for row in sequences})
+    frames = sum(release["frames"].values())
+    return (
+        f"{len(sequences)} sequences from {places} places, {seconds / 3600:.2f} h, {metres / 1000:.2f} km, "
+        f"{frames} frames, {release['files']} files, {release['bytes'] / 1e9:.2f} GB."
+    )
+
+
+def _sequence_cells(row: Mapping[str, Any]) -> tuple[Any, ...]:
+    seconds = (row["t_end_ns"] - row["t_start_ns"]) / 1e9
+    metres = "-" if row["distance_m"] is None else f"{row['distance_m']:.0f}"
+    return (
+        row["sequence"],
+        row["place"],
+        row["road_type"],
+        row["frames"],
+        row["reviewed_frames"],
+        row["boxes_positive"],
+        row["boxes_negative"],
+        f"{seconds:.1f}",
+        metres,
+    )
+
+
+def _known_issues(release: Mapping[str, Any], sequences: Sequence[Mapping[str, Any]]) -> str:
+    lines = [
+        f"- `{item['sequence']}`: {item['stage']} failed its gate `{item['figure']}`; released because "
+        f"{item['reason']} (signed by {item['signed_by']})."
+        for item in release["overrides"]
+    ]
+    lines += [
+        f"- `{row['sequence']}`: {row['frames'] - row['reviewed_frames']} frames have labels nobody reviewed."
+        for row in sequences
+        if row["reviewed_frames"] < row["frames"]
+    ]
+    return "\n".join(lines) or "None known."
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in lines)
