@@ -1,0 +1,47 @@
+# From raw drives to licensed, anonymized, validated release trees.
+#
+#   snakemake release --cores 2           build and validate all trees (the default)
+#   snakemake validate --cores 2          validate them again
+#   snakemake report --cores 2            a page of maps, overlays and quality figures
+#   snakemake benchmark --cores 2         evaluate predictions on the release
+#   snakemake assign_splits --cores 2     give new sequences their rows in the splits ledger
+from snakemake.utils import min_version
+
+min_version("9.27")
+
+
+configfile: "config/config.yaml"
+
+
+include: "workflow/rules/common.smk"
+include: "workflow/rules/simulation.smk"
+include: "workflow/rules/ingest.smk"
+include: "workflow/rules/calibration.smk"
+include: "workflow/rules/poses.smk"
+include: "workflow/rules/ground_truth.smk"
+include: "workflow/rules/wheels.smk"
+include: "workflow/rules/privacy.smk"
+include: "workflow/rules/annotations.smk"
+include: "workflow/rules/splits.smk"
+include: "workflow/rules/packaging.smk"
+include: "workflow/rules/report.smk"
+include: "workflow/rules/benchmark.smk"
+
+
+rule release:
+    default_target: True
+    input:
+        validations(),
+        simulated_days(),
+
+
+onstart:
+    check_space()
+
+
+onsuccess:
+    print_summary()
+
+
+onerror:
+    print_failure()

@@ -1,0 +1,116 @@
+# What every rule file uses: the checked configuration, the sequences to build, fingerprints of code and raw data.
+from pathlib import Path
+
+from card.artifacts.code import code_hash
+from card.artifacts.documents import read_yaml
+from card.artifacts.schemas import check, load_schema, with_defaults
+from card.errors import CardError
+from card.recording.fingerprint import fingerprint
+from card.recording.sheet import read_sequences
+
+BASE = Path(workflow.basedir)
+SETTINGS = with_defaults(config, load_schema("config"))
+RAW = SETTINGS["recordings"]
+CAMERAS = ("camera_left", "camera_right")
+LIDARS = ("lidar_front", "lidar_rear")
+
+
+def load_plan():
+    """The checked configuration: licences, gates and the sequences to build, by id."""
+    check(SETTINGS, "config", "config/config.yaml")
+    licenses = read_yaml(Path(SETTINGS["licenses"]), "licenses")
+    gates = read_yaml(Path(SETTINGS["gates"]), "gates")
+    rows = read_sequences(Path(SETTINGS["sheet"]), licenses["countries"])
+    wanted = [name for name in str(SETTINGS["sequences"]).split(",") if name]
+    unknown = sorted(set(wanted) - {row.id for row in rows})
+    if unknown:
+        raise CardError("unknown sequence", where="--config sequences", found=unknown[0])
+    chosen = {row.id: row for row in rows if not row.quarantine and (not wanted or row.id in wanted)}
+    for row in chosen.values():
+        check_raw_input(row)
+    return licenses, gates, chosen
+
+
+def check_raw_input(row):
+    """A recorded drive and its session must be there before anything starts."""
+    simulated = SETTINGS["simulation"]
+    if row.id not in simulated["drives"] and not Path(row.recording, "recording.yaml").is_file():
+        raise CardError("recording is missing", where=row.id, wanted=f"{row.recording}/recording.yaml")
+    if row.session and row.session not in simulated["sessions"]:
+        folder = Path(RAW, "sessions")
+        if not (folder / row.session).is_dir():
+            there = sorted(path.name for path in folder.glob("*")) + simulated["sessions"]
+            raise CardError("unknown session", where=row.id, found=row.session, wanted=f"one of {there}")
+
+
+try:
+    LICENSES, GATES, SEQUENCES = load_plan()
+except CardError as error:
+    raise WorkflowError(f"card: {error}") from None
+
+
+wildcard_constraints:
+    id="[a-z0-9_-]+",
+    session="[0-9]{4}-[0-9]{2}-[0-9]{2}-(start|mid|end)",
+    day="[0-9]{4}-[0-9]{2}-[0-9]{2}",
+
+
+def code(stage):
+    """Hash of a stage's script and of all library code behind it."""
+    return code_hash(BASE / "workflow" / "scripts" / f"{stage}.py")
+
+
+def cfg(stage):
+    """Settings and gates of a stage, as one dict of builtins: what its artifacts depend on besides inputs."""
+    scale = SETTINGS["scale"]
+    gates = [
+        {**{name: gate[name] for name in ("figure", "unit", "better")}, "threshold": gate["threshold"][scale]}
+        for gate in GATES
+        if gate["stage"] == stage and scale in gate["threshold"]
+    ]
+    return {"settings": SETTINGS[stage], "gates": gates}
+
+
+def row(wildcards):
+    """The sheet's row of a sequence, as a dict of builtins."""
+    return SEQUENCES[wildcards.id].as_dict()
+
+
+def raw_folder(wildcards):
+    return SEQUENCES[wildcards.id].recording
+
+
+def recording_folder(wildcards):
+    """Folder in the raw layout: as recorded, or as converted from a bag."""
+    sequence = SEQUENCES[wildcards.id]
+    return f"results/{sequence.id}/recording" if sequence.format == "rosbag2" else sequence.recording
+
+
+def raw_fingerprint(*names):
+    """A param function: fingerprint of the named files and folders of a sequence's raw recording."""
+
+    def of_sequence(wildcards):
+        folder, cache = Path(raw_folder(wildcards)), Path("results", wildcards.id, "fingerprints")
+        return {name: fingerprint(folder / name, cache / f"{name}.json") for name in names}
+
+    return of_sequence
+
+
+def has(sequence, *modalities):
+    return all(name in sequence.modalities for name in modalities)
+
+
+def has_camera(sequence):
+    return any(name in sequence.modalities for name in CAMERAS)
+
+
+def has_poses(sequence):
+    return bool(sequence.session) and has(sequence, "imu")
+
+
+def has_map(sequence):
+    return has_poses(sequence) and has(sequence, "camera_left", *LIDARS)
+
+
+def ids(condition=lambda sequence: True):
+    return [name for name, sequence in SEQUENCES.items() if condition(sequence)]

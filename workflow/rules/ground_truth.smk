@@ -1,0 +1,25 @@
+# Needs: bursts of both LiDARs, calibration, the trajectory at IMU rate.
+# Makes: results/{id}/ground_truth/ with one npz a frame, the static voxels and the coverage.
+
+
+rule ground_truth:
+    input:
+        bursts=rules.ingest.output.bursts,
+        frames=rules.ingest.output.frames,
+        calibration=rules.calibration.output.calibration,
+        ego_mask=rules.calibration.output.ego_mask,
+        trajectory=rules.poses.output.trajectory,
+    output:
+        inventory="results/{id}/ground_truth/inventory.parquet",
+        static_voxels="results/{id}/ground_truth/static_voxels.npz",
+        coverage="results/{id}/ground_truth/coverage.parquet",
+        report="results/{id}/ground_truth.report.json",
+    log:
+        "logs/{id}/ground_truth.log",
+    params:
+        cfg=cfg("ground_truth"),
+        code=code("ground_truth"),
+        recording=recording_folder,
+        out=subpath(output.inventory, parent=True),
+    script:
+        "../scripts/ground_truth.py"

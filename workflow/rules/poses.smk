@@ -1,0 +1,22 @@
+# Needs: a delivered trajectory, the IMU, the times of bursts and frames.
+# Makes: results/{id}/trajectory.parquet (IMU rate) and poses.json.
+
+
+rule poses:
+    input:
+        delivered=lambda wildcards: f"{raw_folder(wildcards)}/trajectory.tum",
+        bursts=rules.ingest.output.bursts,
+        frames=rules.ingest.output.frames,
+        calibration=rules.calibration.output.calibration,
+    output:
+        trajectory="results/{id}/trajectory.parquet",
+        poses="results/{id}/poses.json",
+        report="results/{id}/poses.report.json",
+    log:
+        "logs/{id}/poses.log",
+    params:
+        cfg=cfg("poses"),
+        code=code("poses"),
+        recording=recording_folder,
+    script:
+        "../scripts/poses.py"

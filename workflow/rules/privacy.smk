@@ -1,0 +1,23 @@
+# Needs: the raw images of both cameras and, for the recall gate, what a person labelled in some of them.
+# Makes: results/{id}/anonymized/, the only place later rules take images from.
+
+
+rule privacy:
+    input:
+        frames=rules.ingest.output.frames,
+    output:
+        images="results/{id}/anonymized/images.parquet",
+        redactions="results/{id}/anonymized/redactions.parquet",
+        inventory="results/{id}/anonymized/inventory.parquet",
+        report="results/{id}/privacy.report.json",
+    log:
+        "logs/{id}/privacy.log",
+    params:
+        cfg=cfg("privacy"),
+        code=code("privacy"),
+        raw=raw_fingerprint("privacy_labels.csv"),
+        recording=recording_folder,
+        labelled=lambda wildcards: f"{raw_folder(wildcards)}/privacy_labels.csv",
+        out=subpath(output.images, parent=True),
+    script:
+        "../scripts/privacy.py"
