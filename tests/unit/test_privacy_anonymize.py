@@ -53,6 +53,7 @@ def run(recording: Path, results: str = "town", threads: int = 1, gates=(), **se
     anonymize(
         recording=recording,
         frames=root / "frames.parquet",
+        labelled=recording / "privacy_labels.csv",
         out=out,
         report=out.parent / "privacy.report.json",
         settings=default_settings("privacy") | settings,

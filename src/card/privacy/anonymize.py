@@ -25,6 +25,7 @@ def anonymize(
     *,
     recording: Path,
     frames: Path,
+    labelled: Path,
     out: Path,
     report: Path,
     settings: Mapping[str, Any],
@@ -35,9 +36,9 @@ def anonymize(
 
     Parameters
     ----------
-    recording : folder with ``camera_left|right/<t_ns>.jpg`` and, where a person labelled some images,
-        ``privacy_labels.csv``.
+    recording : folder with ``camera_left|right/<t_ns>.jpg``.
     frames : table ``frames`` of the sequence.
+    labelled : ``privacy_labels.csv``, where a person labelled some images; without it recall is unknown.
     out : folder ``results/<id>/anonymized``, written whole or not at all.
     settings : as ``settings/privacy``.
     threads : worker processes; the bytes do not depend on it.
@@ -45,8 +46,7 @@ def anonymize(
     Raises ``CardError`` when a single image cannot be read, redacted or verified: then nothing is written.
     """
     detector = _detector(settings)
-    labels_file = recording / "privacy_labels.csv"
-    labels = read_labels(labels_file) if labels_file.is_file() else None
+    labels = read_labels(labelled) if labelled.is_file() else None
     with atomic_folder(out) as folder, tempfile.TemporaryDirectory() as scratch:
         jobs = _jobs(recording, read_table(frames, "frames"), folder)
         # Forked workers need no importable main module, which a Snakemake script does not have.
@@ -66,7 +66,7 @@ def anonymize(
     write_account(
         report,
         sequence=out.parent.name,
-        inputs={"frames": frames} | ({} if labels is None else {"privacy_labels": labels_file}),
+        inputs={"frames": frames} | ({} if labels is None else {"privacy_labels": labelled}),
         labels=labels or [],
         settings=settings,
         gates=gates,
