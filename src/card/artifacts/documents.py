@@ -32,11 +32,18 @@ def read_json(path: Path, schema: str) -> Any:
 
 
 def read_yaml(path: Path, schema: str) -> Any:
-    """Read a YAML document and check it against ``schema``."""
+    """Read a YAML document and check it against ``schema``; dates stay the strings they are written as."""
     import yaml
 
+    class Loader(yaml.SafeLoader):
+        # Documents have JSON's types: a date without quotes is a string too.
+        yaml_implicit_resolvers = {  # noqa: RUF012
+            first: [pair for pair in pairs if pair[0] != "tag:yaml.org,2002:timestamp"]
+            for first, pairs in yaml.SafeLoader.yaml_implicit_resolvers.items()
+        }
+
     try:
-        document = yaml.safe_load(_text(path))
+        document = yaml.load(_text(path), Loader=Loader)
     except yaml.YAMLError as error:
         raise CardError("not YAML", where=path, found=error) from error
     check(document, schema, path)
