@@ -1,0 +1,5 @@
+"""Calibration of a sequence: from a delivered bundle."""
+
+from card.calibration.import_bundle import import_bundle
+
+__all__ = ["import_bundle"]

@@ -1,0 +1,103 @@
+"""The path of a wheel's contact point if the wheel were rigidly fixed to the rig."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from card.geometry import Trajectory, apply, matrix_from_quaternion, transform
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class ContactPath:
+    """A rigid contact path and the poses of it that carry arc length (supplement, "Wheel Excitation").
+
+    t_ns, position, rotation : all N trajectory times (N,), contact points in world (N, 3) in metres,
+        rotations world_from_rig (N, 3, 3).
+    knots : (M,) indices of the poses that are at least one step apart; a standing car adds none.
+    knot_arc : (M,) cumulative length d_i of the polyline through them, metres.
+    arc : (N,) arc length of every pose, by projection on that polyline.
+    run : (M - 1,) number of the run each segment belongs to: it grows where driving turns to reverse or back.
+    """
+
+    t_ns: Indices
+    position: Array
+    rotation: Array
+    knots: Indices
+    knot_arc: Array
+    arc: Array
+    run: Indices
+
+    @property
+    def knot_position(self) -> Array:
+        """Contact points (M, 3) of the knots, metres in world."""
+        return self.position[self.knots]
+
+    @property
+    def knot_rotation(self) -> Array:
+        """Rotations world_from_rig (M, 3, 3) of the knots."""
+        return self.rotation[self.knots]
+
+    def arc_at(self, t_ns: ArrayLike) -> Array:
+        """Arc lengths (...) in metres at times (...) in nanoseconds."""
+        # Differences first: nanoseconds since 1970 do not fit a float64.
+        since = np.asarray(t_ns, dtype=np.int64) - self.t_ns[0]
+        return np.interp(since, self.t_ns - self.t_ns[0], self.arc)
+
+    def surface(self, arc: ArrayLike, height: ArrayLike) -> Array:
+        """Points (..., 3) in world at arc lengths (...) and heights (...) over the path, both metres.
+
+        The inverse of `arc_height.project`: blends the two poses around each arc length.
+        """
+        d, h = np.asarray(arc, dtype=np.float64), np.asarray(height, dtype=np.float64)
+        raised = np.broadcast_to(h[..., None], (*d.shape, 1))
+        if len(self.knots) == 1:
+            return self.knot_position[0] + raised * self.knot_rotation[0, :, 2]
+        i = np.clip(np.searchsorted(self.knot_arc, d, side="right"), 1, len(self.knots) - 1)
+        before, after = self.knot_arc[i - 1], self.knot_arc[i]
+        alpha = ((d - before) / (after - before))[..., None]
+        low = self.knot_position[i - 1] + raised * self.knot_rotation[i - 1, :, 2]
+        high = self.knot_position[i] + raised * self.knot_rotation[i, :, 2]
+        return (1 - alpha) * low + alpha * high
+
+
+def contact_path(trajectory: Trajectory, contact_rig: ArrayLike, min_step_m: float) -> ContactPath:
+    """The path of a contact point (3,), metres in rig, along a trajectory; steps shorter are dropped."""
+    world_from_rig = transform(trajectory.translation_m, trajectory.rotation_wxyz)
+    points = np.broadcast_to(np.asarray(contact_rig, dtype=np.float64), (len(trajectory.t_ns), 3))
+    position = apply(world_from_rig, points)
+    rotation = matrix_from_quaternion(trajectory.rotation_wxyz)
+    knots = _knots(position, min_step_m)
+    steps = np.diff(position[knots], axis=0)
+    lengths = np.linalg.norm(steps, axis=1)
+    knot_arc = np.concatenate([[0.0], np.cumsum(lengths)])
+    forward = np.einsum("ij,ij->i", steps, rotation[knots[:-1], :, 1]) >= 0
+    run = np.concatenate([[0], np.cumsum(forward[1:] != forward[:-1])])[: len(steps)].astype(np.int64)
+    arc = _arc(position, knots, knot_arc)
+    return ContactPath(trajectory.t_ns, position, rotation, knots, knot_arc, arc, run)
+
+
+def _knots(position: Array, min_step_m: float) -> Indices:
+    points = position.tolist()
+    kept, last = [0], points[0]
+    for i, point in enumerate(points):
+        if math.dist(point, last) >= min_step_m:
+            kept.append(i)
+            last = point
+    return np.array(kept, dtype=np.int64)
+
+
+def _arc(position: Array, knots: Indices, knot_arc: Array) -> Array:
+    if len(knots) == 1:
+        return np.zeros(len(position))
+    segment = np.clip(np.searchsorted(knots, np.arange(len(position)), side="right"), 1, len(knots) - 1)
+    start = position[knots[segment - 1]]
+    step = position[knots[segment]] - start
+    alpha = np.einsum("ij,ij->i", step, position - start) / np.einsum("ij,ij->i", step, step)
+    # What is left after the last knot is shorter than a step and goes on along the last segment.
+    limit = np.where(np.arange(len(position)) > knots[-1], 2.0, 1.0)
+    return knot_arc[segment - 1] + np.clip(alpha, 0.0, limit) * (knot_arc[segment] - knot_arc[segment - 1])

@@ -1,0 +1,159 @@
+"""The wheels stage: ground contact of each wheel over time and the road plane of each frame."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from card.artifacts import (
+    Figure,
+    progress,
+    read_arrays,
+    read_json,
+    read_table,
+    read_yaml,
+    write_json,
+    write_report,
+    write_table,
+)
+from card.geometry import Trajectory, from_json
+from card.recording.paths import description_path
+from card.wheels.arc_height import Corridor
+from card.wheels.contact_path import contact_path
+from card.wheels.profile import SplineSettings
+from card.wheels.road_plane import RoadPlanes
+from card.wheels.samples import BurstFile, Lidar, collect_samples, moving_bursts
+from card.wheels.static_points import StaticVoxels
+from card.wheels.tables import excitation_document, frame_planes, plane_columns
+from card.wheels.wheel_fit import Excitation, GapSettings, fit_excitation
+
+WHEELS = ("fl", "fr", "rl", "rr")
+
+
+def excite(
+    *,
+    recording: Path,
+    bursts: Path,
+    frames: Path,
+    calibration: Path,
+    trajectory: Path,
+    static_voxels: Path,
+    wheel_excitation: Path,
+    road_planes: Path,
+    report: Path,
+    settings: Mapping[str, Any],
+    gates: Sequence[Mapping[str, Any]],
+) -> None:
+    """Fit the road under each wheel and write the excitation and the road planes of a sequence.
+
+    Paper, "Wheel Excitation" and its supplement; "Height Evaluation Metrics" for the plane.
+
+    Parameters
+    ----------
+    recording : folder with the bursts.
+    bursts, frames, calibration, trajectory, static_voxels : artifacts of the schemas of these names.
+    wheel_excitation, road_planes, report : the files to write.
+
+    Raises
+    ------
+    CardError
+        For inputs that do not fit their schemas, or a trajectory that does not cover a burst or frame.
+    """
+    path = Trajectory.from_table(read_table(trajectory, "trajectory"))
+    bundle = read_json(calibration, "calibration")
+    paths = {
+        name: contact_path(path, bundle["wheels"][name]["contact_m"], settings["min_step_m"])
+        for name in WHEELS
+    }
+    description = read_yaml(description_path(recording), "recording")
+    files = moving_bursts(_burst_files(bursts, recording), paths["fl"], settings["min_step_m"])
+    samples = collect_samples(
+        progress(files, "wheels"),
+        _lidars(bundle, description),
+        path,
+        list(paths.values()),
+        StaticVoxels(read_arrays(static_voxels, "static_voxels")),
+        Corridor(settings["corridor_half_width_m"], settings["max_height_m"]),
+        settings["arc_window_m"],
+    )
+    spline = SplineSettings(**{name: settings[name] for name in SplineSettings.__dataclass_fields__})
+    gaps = GapSettings(settings["gap_reach_m"], settings["gap_min_points"])
+    wheels = {
+        name: fit_excitation(paths[name], arc, height, spline, gaps)
+        for name, (arc, height) in zip(WHEELS, samples, strict=True)
+    }
+
+    table = read_table(frames, "frames")
+    t_ns = np.asarray(table["t_ns"], dtype=np.int64)
+    planes, beside_gap = frame_planes(wheels, path, t_ns)
+    valid = ~beside_gap & (planes.residual_m <= settings["max_plane_residual_m"])
+
+    write_json(wheel_excitation, excitation_document(wheels, path), "wheel_excitation")
+    write_table(road_planes, plane_columns(np.asarray(table["frame"]), t_ns, planes, valid), "road_planes")
+    write_report(
+        report,
+        stage="wheels",
+        sequence=description["id"],
+        settings=settings,
+        inputs={
+            "bursts": bursts,
+            "frames": frames,
+            "calibration": calibration,
+            "trajectory": trajectory,
+            "static_voxels": static_voxels,
+        },
+        counts={
+            "bursts": len(files),
+            "samples": len(path.t_ns),
+            "frames": len(t_ns),
+            **{f"points_{name}": len(arc) for name, (arc, _) in zip(WHEELS, samples, strict=True)},
+        },
+        figures=_figures(wheels, planes, valid),
+        gates=gates,
+    )
+
+
+def _burst_files(bursts: Path, recording: Path) -> list[BurstFile]:
+    table = read_table(bursts, "bursts")
+    columns = (table[name].to_pylist() for name in ("lidar", "t_start_ns", "file"))
+    files = [BurstFile(lidar, t_ns, recording / file) for lidar, t_ns, file in zip(*columns, strict=True)]
+    return sorted(files, key=lambda file: (file.t_start_ns, file.lidar))
+
+
+def _lidars(bundle: Mapping[str, Any], description: Mapping[str, Any]) -> dict[str, Lidar]:
+    return {
+        name: Lidar(
+            from_json(bundle["extrinsics"][f"rig_from_{name}"]),
+            corrections,
+            description["sensors"].get(name, {}).get("deskewed", False),
+        )
+        for name, corrections in bundle["lidar_corrections"].items()
+    }
+
+
+def _figures(wheels: Mapping[str, Excitation], planes: RoadPlanes, valid: NDArray[np.bool_]) -> list[Figure]:
+    gap = np.concatenate([wheel.gap for wheel in wheels.values()])
+    residual = np.concatenate([wheel.residual_m[~wheel.gap] for wheel in wheels.values()])
+    points = np.concatenate([wheel.points[~wheel.gap] for wheel in wheels.values()])
+    return [
+        Figure("gap_pct", 100 * float(gap.mean()), "%", "samples with too few LiDAR points near"),
+        Figure("points_near", _median(points), "1", "median number of points near a sample that is no gap"),
+        Figure(
+            "residual_mm", _median(1e3 * residual), "mm", "median rms distance of the points from the spline"
+        ),
+        Figure(
+            "plane_residual_mm", _median(1e3 * planes.residual_m), "mm", "median residual of the road planes"
+        ),
+        Figure(
+            "plane_valid_pct",
+            100 * float(valid.mean()) if len(valid) else None,
+            "%",
+            "frames with a valid road plane",
+        ),
+    ]
+
+
+def _median(values: NDArray[Any]) -> float | None:
+    return float(np.median(values)) if len(values) else None

@@ -1,0 +1,34 @@
+"""Which points lie in the static voxels of a sequence."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class StaticVoxels:
+    """The voxel set of schema ``static_voxels``: origin (3,), voxel_size in metres, ids (V, 3)."""
+
+    def __init__(self, arrays: Mapping[str, NDArray[np.generic]]) -> None:
+        self._origin = np.asarray(arrays["origin"], dtype=np.float64)
+        self._size = float(arrays["voxel_size"])
+        ids = np.asarray(arrays["ids"], dtype=np.int64).reshape(-1, 3)
+        self._low = ids.min(axis=0) if len(ids) else np.zeros(3, dtype=np.int64)
+        self._extent = ids.max(axis=0) - self._low + 1 if len(ids) else np.zeros(3, dtype=np.int64)
+        self._keys = np.sort(self._key(ids - self._low))
+
+    def contain(self, points: Array) -> NDArray[np.bool_]:
+        """Whether each of the points (N, 3), metres in world, lies in a static voxel."""
+        voxel = np.floor((points - self._origin) / self._size).astype(np.int64) - self._low
+        within = np.all((voxel >= 0) & (voxel < self._extent), axis=1)
+        if not within.any():
+            return within
+        keys = self._key(voxel[within])
+        at = np.minimum(np.searchsorted(self._keys, keys), len(self._keys) - 1)
+        within[within] = self._keys[at] == keys
+        return within
+
+    def _key(self, voxel: NDArray[np.int64]) -> NDArray[np.int64]:
+        return (voxel[:, 0] * self._extent[1] + voxel[:, 1]) * self._extent[2] + voxel[:, 2]

@@ -1,0 +1,62 @@
+"""The wheel artifacts in the form in which they are written."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from card.geometry import Trajectory, apply, inverse, quaternion_from_matrix
+from card.wheels.road_plane import RoadPlanes, fit_road_planes
+from card.wheels.wheel_fit import Excitation
+
+Array = NDArray[np.float64]
+#: A micrometre, and a nanoradian for the quaternion: no reader needs more.
+POSITION_DECIMALS, QUATERNION_DECIMALS = 6, 9
+
+
+def excitation_document(wheels: Mapping[str, Excitation], trajectory: Trajectory) -> dict[str, Any]:
+    """The document of schema ``wheel_excitation``."""
+    rotation = np.round(trajectory.rotation_wxyz, QUATERNION_DECIMALS).tolist()
+    document: dict[str, Any] = {}
+    for name, wheel in wheels.items():
+        position = np.round(wheel.position, POSITION_DECIMALS).tolist()
+        document[name] = {
+            "samples": [[t, *p, *q] for t, p, q in zip(wheel.t_ns.tolist(), position, rotation, strict=True)],
+            "points": wheel.points.tolist(),
+            "residual_m": [
+                None if np.isnan(value) else round(value, POSITION_DECIMALS)
+                for value in wheel.residual_m.tolist()
+            ],
+            "gap": wheel.gap.tolist(),
+        }
+    return {"schema": "wheel_excitation", "wheels": document}
+
+
+def frame_planes(
+    wheels: Mapping[str, Excitation], trajectory: Trajectory, t_ns: NDArray[np.int64]
+) -> tuple[RoadPlanes, NDArray[np.bool_]]:
+    """The road planes at frame times (F,) and whether any contact then is in a gap (F,)."""
+    found = [wheel.at(t_ns) for wheel in wheels.values()]
+    rig_from_world = inverse(trajectory.at(t_ns))
+    contacts = np.stack([apply(rig_from_world, position) for position, _ in found], axis=1)
+    gap = np.any([gap for _, gap in found], axis=0)
+    return fit_road_planes(contacts), gap
+
+
+def plane_columns(
+    frame: NDArray[np.int32], t_ns: NDArray[np.int64], planes: RoadPlanes, valid: NDArray[np.bool_]
+) -> dict[str, NDArray[Any]]:
+    """The columns of schema ``road_planes``, each (F,)."""
+    road_from_rig = planes.road_from_rig()
+    quaternion = quaternion_from_matrix(road_from_rig[:, :3, :3])
+    return {
+        "frame": frame,
+        "t_ns": t_ns,
+        **{f"normal_{axis}": planes.normal[:, i] for i, axis in enumerate("xyz")},
+        "offset_m": planes.offset_m,
+        "residual_m": planes.residual_m,
+        "valid": valid,
+        **{axis: road_from_rig[:, i, 3] for i, axis in enumerate("xyz")},
+        **{f"q{axis}": quaternion[:, i] for i, axis in enumerate("wxyz")},
+    }
