@@ -1,11 +1,11 @@
 """Stage `package`: one sequence as shards, tables and sidecars, without its split."""
 
+import math
 import shutil
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from card.artifacts import (
     Figure,
@@ -46,7 +46,6 @@ def pack_sequence(
     lidar_rear: Path | None,
     imu: Path | None,
     calibration: Path | None,
-    trajectory: Path | None,
     poses: Path | None,
     wheel_excitation: Path | None,
     road_planes: Path | None,
@@ -69,7 +68,6 @@ def pack_sequence(
     sequence : row of the sequence sheet.
     spdx : licence of every file of this sequence.
     recording_inventory : names and hashes of the raw recording.
-    trajectory : gives the length of the drive and is not packed; `poses` holds what users need.
     lidar_front, lidar_rear : folders of raw bursts; ground_truth, anonymized : folders of their stages.
     reports : stage -> report of every stage this package stands on.
 
@@ -113,7 +111,6 @@ def pack_sequence(
         "recording": recording_inventory,
         "labels": labels,
         "label_states": label_states,
-        "trajectory": trajectory,
         "ground_truth": ground_truth / "inventory.parquet" if ground_truth else None,
         "anonymized": anonymized / "inventory.parquet" if anonymized else None,
         **{Path(name).stem: path for name, (path, _) in sidecars.items()},
@@ -141,7 +138,7 @@ def pack_sequence(
             "sources": {name: sha256_file(path) for name, path in sorted(sources.items())},
         }
         write_json(folder / "sidecars" / "provenance.json", provenance, "provenance")
-        distance_m = _distance(trajectory) if trajectory else None
+        distance_m = _distance(poses) if poses else None
         document = sequence_document(sequence, spdx, columns, members, burst_rows, distance_m)
         write_json(folder / "sequence.json", document, "release_sequence")
         write_table(folder / "inventory.parquet", inventory(folder), "inventory")
@@ -198,8 +195,8 @@ def _write_members(
     return columns
 
 
-def _distance(trajectory: Path) -> float:
-    """Length of the track, m."""
-    table = read_table(trajectory, "trajectory")
-    track = np.stack([table[axis].to_numpy() for axis in "xyz"], axis=1)
-    return float(np.linalg.norm(np.diff(track, axis=0), axis=1).sum())
+def _distance(poses: Path) -> float:
+    """Length of the track through all poses, m."""
+    rows = sorted(read_json(poses, "poses")["poses"], key=lambda row: row["t_ns"])
+    track = [row["translation_m"] for row in rows]
+    return sum(math.dist(before, after) for before, after in pairwise(track))

@@ -8,7 +8,7 @@ from typing import Any
 from card.artifacts import Figure, read_table, write_report, write_table
 from card.errors import CardError
 from card.splits.ledger import SPLITS, UNASSIGNED, ZERO_SHOT, Row, parse
-from card.splits.strata import frame_topographies, is_off_road, stratum
+from card.splits.strata import frame_topographies, stratum
 
 
 def assign(
@@ -42,7 +42,7 @@ def assign(
     topographies = frame_topographies(
         read_table(labels, "labels").to_pydict(),
         read_table(label_states, "label_states").to_pydict(),
-        is_off_road(sequence),
+        sequence["off_road"],
     )
     step, offset = settings["frame_step"], settings["frame_offset"]
     columns: dict[str, list[Any]] = {"frame": numbers, "split": [], "group": [], "stratum": [], "sampled": []}

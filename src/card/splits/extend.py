@@ -9,7 +9,7 @@ from typing import Any
 from card.artifacts import read_table
 from card.errors import CardError
 from card.splits.ledger import ASSIGNED, ZERO_SHOT, Row, append_rows, read_ledger
-from card.splits.strata import frame_topographies, is_off_road, sequence_topography, stratum
+from card.splits.strata import frame_topographies, sequence_topography, stratum
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ def extend_ledger(
     drives = [
         _drive(sequence, results / sequence["id"], settings)
         for sequence in sequences
-        if sequence["quarantine"] == "-" and _has_frames(sequence)
+        if "camera_left" in sequence["modalities"] and not sequence["quarantine"]
     ]
     rows = choose(known, drives, settings)
     if rows:
@@ -82,10 +82,6 @@ def choose(known: Sequence[Row], drives: Sequence[Drive], settings: Mapping[str,
     return sorted(rows, key=lambda row: row.sequence)
 
 
-def _has_frames(sequence: Mapping[str, Any]) -> bool:
-    return sequence["modalities"] == "all" or "camera_left" in sequence["modalities"].split(",")
-
-
 def _drive(sequence: Mapping[str, Any], folder: Path, settings: Mapping[str, Any]) -> Drive:
     paths = {name: folder / f"{name}.parquet" for name in ("frames", "labels", "label_states")}
     for path in paths.values():
@@ -100,7 +96,7 @@ def _drive(sequence: Mapping[str, Any], folder: Path, settings: Mapping[str, Any
     topographies = frame_topographies(
         read_table(paths["labels"], "labels").to_pydict(),
         read_table(paths["label_states"], "label_states").to_pydict(),
-        is_off_road(sequence),
+        sequence["off_road"],
     )
     return Drive(
         id=sequence["id"],

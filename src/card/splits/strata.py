@@ -20,11 +20,6 @@ def topography(classes: Iterable[str], state: str, off_road: bool) -> str:
     return NEGATIVE if NEGATIVE in found else POSITIVE if POSITIVE in found else NONE
 
 
-def is_off_road(sequence: Mapping[str, Any]) -> bool:
-    """The sheet's off-road flag, from its cell."""
-    return str(sequence["off_road"]).lower() == "true"
-
-
 def frame_topographies(
     labels: Mapping[str, list[Any]], states: Mapping[str, list[Any]], off_road: bool
 ) -> dict[int, str]:

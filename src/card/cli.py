@@ -1,0 +1,78 @@
+"""Command line: `card validate TREE`, `card splits extend`, `card summary`."""
+
+import argparse
+import logging
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from card.errors import CardError
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; 1 and a line on standard error when it cannot be done."""
+    parser = argparse.ArgumentParser(prog="card", description="Release pipeline for road-topography drives.")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    validate = commands.add_parser("validate", help="check a release tree")
+    validate.add_argument("tree", type=Path)
+    validate.add_argument("--ledger", type=Path, help="split ledger that the splits must equal")
+    validate.add_argument("--load", action="store_true", help="also load every config with `datasets`")
+    validate.set_defaults(run=_validate)
+
+    splits = commands.add_parser("splits", help="the split ledger").add_subparsers(
+        required=True, metavar="ACTION"
+    )
+    extend = splits.add_parser("extend", help="append rows for new sequences")
+    extend.add_argument("--sheet", type=Path, default=Path("config/sequences.tsv"))
+    extend.add_argument("--licenses", type=Path, default=Path("config/licenses.yaml"))
+    extend.add_argument("--ledger", type=Path, default=Path("config/ledger/splits.tsv"))
+    extend.add_argument("--results", type=Path, default=Path("results"))
+    extend.set_defaults(run=_extend)
+
+    summary = commands.add_parser("summary", help="what was released")
+    summary.add_argument("release", type=Path, nargs="?", default=Path("results/release"))
+    summary.set_defaults(run=_summary)
+
+    options = parser.parse_args(arguments)
+    logging.basicConfig(format="%(message)s", level=logging.WARNING)
+    try:
+        options.run(options)
+    except CardError as error:
+        print(f"card: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+def _validate(options: argparse.Namespace) -> None:
+    from card.artifacts import default_settings, read_sheet
+    from card.packaging.validate import validate
+
+    settings = default_settings("packaging") | {"load_dataset": options.load}
+    ledger = read_sheet(options.ledger, "splits_ledger") if options.ledger else None
+    validate(options.tree, report=None, settings=settings, ledger=ledger)
+    print(f"{options.tree} is valid")
+
+
+def _extend(options: argparse.Namespace) -> None:
+    from card.artifacts import default_settings
+    from card.packaging.licenses import read_licenses
+    from card.recording.sheet import read_sequences
+    from card.splits.extend import extend_ledger
+
+    countries = read_licenses(options.licenses)["countries"]
+    rows = extend_ledger(
+        sequences=[sequence.as_dict() for sequence in read_sequences(options.sheet, countries)],
+        results=options.results,
+        ledger=options.ledger,
+        settings=default_settings("splits"),
+    )
+    for row in rows:
+        print("\t".join(row.cells()))
+    print(f"{len(rows)} rows appended to {options.ledger}")
+
+
+def _summary(options: argparse.Namespace) -> None:
+    from card.packaging.summary import summarize
+
+    print(summarize(options.release))

@@ -1,0 +1,103 @@
+"""The tables agree with each other, with `release.json` and with the shards."""
+
+from collections import Counter
+from collections.abc import Iterator
+from itertools import pairwise
+
+from card.packaging.checks.contents import Contents, Row
+
+PER_FRAME = ("camera_left", "camera_right", "ground_truth", "labels")
+LIDARS = ("lidar_front", "lidar_rear")
+
+
+def check_tables(contents: Contents) -> Iterator[str]:
+    """Ids, numbers, times and counts across all tables."""
+    yield from _check_frames(contents)
+    yield from _check_sequences(contents)
+    yield from _check_release(contents)
+
+
+def _check_frames(contents: Contents) -> Iterator[str]:
+    for split, rows in contents.frames.items():
+        for row in rows:
+            if row["split"] != split:
+                yield f"metadata/frames-{split}.parquet: {_name(row)} says split {row['split']}"
+    frames = sorted(contents.all_frames(), key=lambda row: (row["sequence"], row["frame"]))
+    known = {row["sequence"] for row in contents.sequences}
+    packed = {(row["modality"], row["sequence"], row["frame"], row["burst"]) for row in contents.members}
+    for before, after in pairwise(frames):
+        if before["sequence"] != after["sequence"]:
+            continue
+        if before["frame"] == after["frame"]:
+            yield f"metadata/frames: {_name(after)} is there twice ({before['split']}, {after['split']})"
+        elif before["t_ns"] >= after["t_ns"]:
+            yield f"metadata/frames: time of {_name(after)} does not increase"
+    for row in frames:
+        if row["sequence"] not in known:
+            yield f"metadata/frames: {_name(row)} belongs to no sequence of metadata/sequences.parquet"
+        for modality in PER_FRAME:
+            if row[f"has_{modality}"] != ((modality, row["sequence"], row["frame"], None) in packed):
+                yield f"metadata/frames: {_name(row)} has_{modality} contradicts the member table"
+        for lidar in LIDARS:
+            burst = row[f"{lidar}_burst"]
+            there = burst is not None and (lidar, row["sequence"], None, burst) in packed
+            if row[f"has_{lidar}"] != there:
+                yield f"metadata/frames: {_name(row)} has_{lidar} contradicts the member table"
+        if row["has_labels"] == (row["label_state"] == "not_reviewed"):
+            yield f"metadata/frames: {_name(row)} has_labels contradicts its label_state {row['label_state']}"
+    numbered = {(row["sequence"], row["frame"]) for row in frames}
+    for row in contents.members:
+        if row["sequence"] not in known:
+            yield f"metadata/members.parquet: {row['file']} belongs to no sequence"
+        elif row["burst"] is None and (row["sequence"], row["frame"]) not in numbered:
+            yield f"metadata/members.parquet: {row['file']} belongs to no frame"
+
+
+def _check_sequences(contents: Contents) -> Iterator[str]:
+    frames = contents.all_frames()
+    counts: dict[str, Counter[str]] = {row["sequence"]: Counter() for row in contents.sequences}
+    for frame in frames:
+        counts.setdefault(frame["sequence"], Counter()).update(
+            frames=1,
+            reviewed_frames=int(frame["label_state"] != "not_reviewed"),
+            boxes_positive=frame["boxes_positive"],
+            boxes_negative=frame["boxes_negative"],
+        )
+    for member in contents.members:
+        counts.setdefault(member["sequence"], Counter()).update(files=1, bytes=member["size"])
+    for row in contents.sequences:
+        where = f"metadata/sequences.parquet: {row['sequence']}"
+        for name in ("frames", "reviewed_frames", "boxes_positive", "boxes_negative", "files", "bytes"):
+            if row[name] != counts[row["sequence"]][name]:
+                yield f"{where} states {row[name]} {name}, found {counts[row['sequence']][name]}"
+        modalities = sorted({m["modality"] for m in contents.members if m["sequence"] == row["sequence"]})
+        if sorted(filter(None, row["modalities"].split(","))) != modalities:
+            yield f"{where} states modalities {row['modalities']}, found {','.join(modalities)}"
+        if row["t_end_ns"] < row["t_start_ns"]:
+            yield f"{where} ends before it starts"
+        for frame in frames:
+            if frame["sequence"] == row["sequence"]:
+                for name in ("country", "place", "road_type", "off_road"):
+                    if frame[name] != row[name]:
+                        yield f"metadata/frames: {_name(frame)} has another {name} than its sequence"
+
+
+def _check_release(contents: Contents) -> Iterator[str]:
+    release = contents.release
+    if release is None:
+        return
+    ids = [row["sequence"] for row in contents.sequences]
+    if release["sequences"] != ids or len(set(ids)) != len(ids):
+        yield "release.json: sequences are not those of metadata/sequences.parquet"
+    for split, rows in contents.frames.items():
+        if release["frames"][split] != len(rows):
+            yield f"release.json: states {release['frames'][split]} {split} frames, found {len(rows)}"
+    if (release["files"], release["bytes"]) != (
+        len(contents.members),
+        sum(r["size"] for r in contents.members),
+    ):
+        yield "release.json: files or bytes are not those of metadata/members.parquet"
+
+
+def _name(row: Row) -> str:
+    return f"{row['sequence']} frame {row['frame']}"

@@ -1,0 +1,67 @@
+"""The few lines that end a run: what was released, how good it is, where to look."""
+
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from card.artifacts import read_json, read_table
+
+UNITS = ((1e9, "GB"), (1e6, "MB"), (1e3, "kB"))
+
+
+def summarize(release: Path) -> str:
+    """Text on all trees under the folder `release`.
+
+    A tree that stands there without its validation report is called so.
+    """
+    trees = sorted(path.parent for path in release.glob("*/release.json"))
+    if not trees:
+        return f"nothing released yet under {release}"
+    documents = [read_json(tree / "release.json", "release") for tree in trees]
+    lines = [
+        f"{document['repository']} ({document['spdx']}): {len(document['sequences'])} sequences, "
+        f"{sum(document['frames'].values())} frames, {document['files']} files, {_bytes(document['bytes'])}, "
+        + ("valid" if (release / f"{document['repository']}.validation.json").is_file() else "NOT VALIDATED")
+        for document in documents
+    ]
+    verdicts: Counter[str] = Counter()
+    for tree in trees:
+        verdicts += Counter(gate["verdict"] for gate in _gates(tree))
+    lines.append(
+        f"gates: {verdicts['pass']} passed, {verdicts['fail']} failed, {verdicts['overridden']} overridden"
+    )
+    for document in documents:
+        lines += [
+            f"  overridden: {item['sequence']}, {item['stage']}, {item['figure']}: {item['reason']} "
+            f"(signed by {item['signed_by']})"
+            for item in document["overrides"]
+        ]
+    if waiting := _without_split(trees):
+        lines.append(
+            f"no split yet: {', '.join(waiting)}; run `snakemake assign_splits`, commit the ledger and build again"
+        )
+    lines.append("look at: " + ", ".join(str(tree / "README.md") for tree in trees))
+    return "\n".join(lines)
+
+
+def _gates(tree: Path) -> list[Any]:
+    return [
+        gate
+        for path in sorted(tree.glob("sequences/*/quality.json"))
+        for stage in read_json(path, "quality")["stages"].values()
+        for gate in stage["gates"]
+    ]
+
+
+def _without_split(trees: Sequence[Path]) -> list[str]:
+    rows = (
+        row
+        for tree in trees
+        for row in read_table(tree / "metadata" / "frames-unassigned.parquet", "release_frames").to_pylist()
+    )
+    return sorted({row["sequence"] for row in rows if row["group"] is None})
+
+
+def _bytes(count: int) -> str:
+    return next((f"{count / size:.2f} {unit}" for size, unit in UNITS if count >= size), f"{count} bytes")
