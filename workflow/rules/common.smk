@@ -7,6 +7,7 @@ from card.artifacts.schemas import check, load_schema, with_defaults
 from card.errors import CardError
 from card.recording.fingerprint import fingerprint
 from card.recording.sheet import read_sequences
+from card.recording.space import require_space
 
 BASE = Path(workflow.basedir)
 SETTINGS = with_defaults(config, load_schema("config"))
@@ -60,20 +61,26 @@ def code(stage):
     return code_hash(BASE / "workflow" / "scripts" / f"{stage}.py")
 
 
-def cfg(stage):
-    """Settings and gates of a stage, as one dict of builtins: what its artifacts depend on besides inputs."""
+def cfg(stage, *names):
+    """Settings (all, or the named ones) and gates of a stage, as one dict of builtins."""
     scale = SETTINGS["scale"]
+    settings = {name: SETTINGS[stage][name] for name in names or SETTINGS[stage]}
     gates = [
         {**{name: gate[name] for name in ("figure", "unit", "better")}, "threshold": gate["threshold"][scale]}
         for gate in GATES
         if gate["stage"] == stage and scale in gate["threshold"]
     ]
-    return {"settings": SETTINGS[stage], "gates": gates}
+    return {"settings": settings, "gates": gates}
 
 
-def row(wildcards):
-    """The sheet's row of a sequence, as a dict of builtins."""
-    return SEQUENCES[wildcards.id].as_dict()
+def row(*names):
+    """A param function: cells of the sequence's row in the sheet that a stage uses, as a dict of builtins."""
+
+    def of_sequence(wildcards):
+        cells = SEQUENCES[wildcards.id].as_dict()
+        return {name: cells[name] for name in names}
+
+    return of_sequence
 
 
 def raw_folder(wildcards):
@@ -94,6 +101,20 @@ def raw_fingerprint(*names):
         return {name: fingerprint(folder / name, cache / f"{name}.json") for name in names}
 
     return of_sequence
+
+
+def check_space():
+    """Stop before the start where the disk cannot hold what is still to be made."""
+    missing = [name for name in SIMULATED["drives"] if name in SEQUENCES and not Path(RAW, name).is_dir()]
+    folders = [Path(sequence.recording) for name, sequence in SEQUENCES.items() if not is_packed(name)]
+    try:
+        require_space(Path("."), folders, len(missing), SETTINGS["scale"])
+    except CardError as error:
+        raise WorkflowError(f"card: {error}") from None
+
+
+def is_packed(name):
+    return Path("results", name, "package", "inventory.parquet").is_file()
 
 
 def has(sequence, *modalities):

@@ -15,6 +15,7 @@ rule import_bag:
         code=code("import_bag"),
         raw=raw_fingerprint("bag", "recording.yaml"),
         recording=raw_folder,
+        out=subpath(output.description, parent=True),
     script:
         "../scripts/import_bag.py"
 
@@ -32,7 +33,7 @@ rule ingest:
     params:
         cfg=cfg("ingest"),
         code=code("ingest"),
-        row=row,
+        row=row("id", "modalities"),
         raw=raw_fingerprint(*CAMERAS, *LIDARS, "imu.parquet", "recording.yaml"),
         recording=recording_folder,
         ledger=f"{RAW}/ledger/frames/{{id}}.tsv",

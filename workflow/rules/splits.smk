@@ -1,8 +1,12 @@
 # Needs: labels and frames of a sequence, its rows of the committed ledger.
 # Makes: results/{id}/splits.parquet. The ledger itself grows only by the target assign_splits.
-from card.splits.ledger import read_ledger
+from card.splits.ledger import COLUMNS, read_ledger
 
-LEDGER = read_ledger(Path(SETTINGS["splits_ledger"]))
+LEDGER = [dict(zip(COLUMNS, line.cells())) for line in read_ledger(Path(SETTINGS["splits_ledger"]))]
+
+
+def ledger_rows(names):
+    return [line for line in LEDGER if line["sequence"] in names]
 
 
 rule splits:
@@ -18,22 +22,21 @@ rule splits:
     params:
         cfg=cfg("splits"),
         code=code("splits"),
-        row=row,
-        rows=lambda wildcards: [line for line in LEDGER if line["sequence"] == wildcards.id],
+        row=row("id", "place", "role", "off_road"),
+        rows=lambda wildcards: ledger_rows({wildcards.id}),
     script:
         "../scripts/splits.py"
 
 
 rule assign_splits:
+    # The committed ledger is not a result: this rule makes no file and runs whenever it is asked for.
     input:
+        frames=expand(rules.ingest.output.frames, id=ids(lambda s: has(s, "camera_left"))),
         labels=expand(rules.annotations.output.labels, id=ids(lambda s: has(s, "camera_left"))),
-    output:
-        proposal="results/splits_ledger.tsv",
     log:
         "logs/assign_splits.log",
     params:
         cfg=cfg("splits"),
-        code=code("assign_splits"),
         ledger=SETTINGS["splits_ledger"],
         sequences=[SEQUENCES[name].as_dict() for name in ids(lambda s: has(s, "camera_left"))],
     script:

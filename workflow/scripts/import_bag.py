@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from card.artifacts import logged
-from card.recording.bag import import_bag
+from card.recording.bag.import_bag import import_bag
 
 with logged(Path(snakemake.log[0])):
     import_bag(

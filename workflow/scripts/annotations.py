@@ -1,0 +1,19 @@
+"""Import the labels of a sequence."""
+
+from pathlib import Path
+
+from card.artifacts import logged
+from card.annotations.import_labels import import_labels
+
+with logged(Path(snakemake.log[0])):
+    import_labels(
+        recording=Path(snakemake.params.recording),
+        annotations=Path(snakemake.params.annotations),
+        frames=Path(snakemake.input.frames),
+        labels=Path(snakemake.output.labels),
+        label_states=Path(snakemake.output.label_states),
+        issues=Path(snakemake.output.issues),
+        report=Path(snakemake.output.report),
+        settings=snakemake.params.cfg["settings"],
+        gates=snakemake.params.cfg["gates"],
+    )

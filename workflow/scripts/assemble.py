@@ -1,0 +1,26 @@
+"""Assemble the release tree of one licence."""
+
+from pathlib import Path
+
+from card.artifacts import logged
+from card.artifacts.schemas import schema_folder
+from card.packaging.assemble import assemble
+
+splits = {Path(path).parent.name: Path(path) for path in snakemake.input.splits}
+
+with logged(Path(snakemake.log[0])):
+    assemble(
+        repository=snakemake.wildcards.repository,
+        spdx=snakemake.params.spdx,
+        terms=snakemake.params.terms,
+        sequences=[
+            {"id": name, "package": Path(package).parent, "splits": splits.get(name)}
+            for name, package in zip(snakemake.params.sequences, snakemake.input.packages, strict=True)
+        ],
+        release_folder=Path(snakemake.params.templates),
+        schemas=schema_folder(),
+        out=Path(snakemake.params.out),
+        report=Path(snakemake.output.report),
+        settings=snakemake.params.cfg["settings"],
+        gates=snakemake.params.cfg["gates"],
+    )
