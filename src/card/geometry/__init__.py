@@ -1,6 +1,7 @@
 """Rigid transforms, trajectories and the camera model."""
 
 from card.geometry.camera import CameraModel
+from card.geometry.rasterize import rasterize
 from card.geometry.trajectory import Trajectory
 from card.geometry.transforms import (
     apply,
@@ -20,6 +21,7 @@ __all__ = [
     "inverse",
     "matrix_from_quaternion",
     "quaternion_from_matrix",
+    "rasterize",
     "to_json",
     "transform",
 ]
