@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from card.artifacts import write_report, write_table
 from card.artifacts import inventory as list_files
+from card.artifacts import write_report, write_table
 from card.errors import CardError
 from card.recording.description import read_description
 from card.recording.ingest import summary

@@ -34,9 +34,8 @@ def figures(
     stamps: Mapping[str, npt.NDArray[np.int64]],
     coverage: Mapping[str, float],
 ) -> list[Figure]:
-    figures = [
-        Figure(f"{sensor}_gap", gap / 1e9, "s", "largest step of time") for sensor, gap in gaps.items()
-    ]
+    """Gaps, rates, how well images pair and what the IMU covers: see each one's description."""
+    found = [Figure(f"{sensor}_gap", gap / 1e9, "s", "largest step of time") for sensor, gap in gaps.items()]
     for sensor, t_ns in stamps.items():
         rate = (len(t_ns) - 1) / (t_ns[-1] - t_ns[0]) * 1e9 if len(t_ns) > 1 else None
         found.append(Figure(f"{sensor}_rate", rate, "Hz", "mean rate"))
