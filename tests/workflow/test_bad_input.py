@@ -1,0 +1,44 @@
+"""What is wrong with the sheet or the raw data is said in one line before anything runs."""
+
+import pytest
+from project import Project
+
+SHEET = "config/sequences.tsv"
+
+
+def refused(project: Project, *arguments: str) -> str:
+    """The line a user sees."""
+    result = project.run("--dry-run", *arguments)
+    assert result.returncode != 0
+    lines = [line for line in result.stdout.splitlines() if "card:" in line]
+    assert len(lines) == 1, result.stdout
+    assert "Traceback" not in result.stdout
+    return lines[0]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("\tDE\t", "\tFR\t", "country without a licence (found FR"),
+        ("de_rural_potholes\t", "de_town_bumps\t", "duplicate id (found de_town_bumps"),
+        ("2026-04-14-start", "2026-04-13-start", "unknown session (found 2026-04-13-start"),
+        (
+            "de_town_bumps\trecordings/de_town_bumps",
+            "my_drive\trecordings/my_drive",
+            "my_drive: recording is missing",
+        ),
+        ("\tzero_shot\t", "\tzero shot\t", "role does not fit schema sequences"),
+    ],
+)
+def test_a_wrong_sheet_is_refused(fresh: Project, old: str, new: str, message: str) -> None:
+    with fresh.changed(SHEET, old, new):
+        assert message in refused(fresh)
+
+
+def test_an_unknown_setting_is_refused(fresh: Project) -> None:
+    with fresh.changed("config/config.yaml", "scale: tiny", "scale: tiny\nvoxels: 3"):
+        assert "'voxels' was unexpected" in refused(fresh)
+
+
+def test_an_unknown_sequence_on_the_command_line_is_refused(fresh: Project) -> None:
+    assert "unknown sequence (found nowhere)" in refused(fresh, "--config", "sequences=nowhere")

@@ -1,0 +1,160 @@
+"""What changed decides what runs; nothing else does."""
+
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from project import Project
+
+pytestmark = pytest.mark.xdist_group("built")
+
+TOWN = "de_town_bumps"
+GERMANY, ITALY = "card-germany", "card-italy"
+DRIVES = [TOWN, "de_rural_potholes", "de_gravel_offroad", "it_town_revisit", "it_zero_shot"]
+STAGES = ["ingest", "poses", "ground_truth", "wheels", "privacy", "annotations", "splits", "package"]
+
+
+def chain(id: str, *stages: str) -> set[tuple[str, str]]:
+    return {(stage, id) for stage in stages}
+
+
+def tree(*repositories: str) -> set[tuple[str, str]]:
+    return {(rule, name) for name in repositories for rule in ("assemble", "validate_tree")}
+
+
+@contextmanager
+def without(path: Path, aside: Path) -> Iterator[None]:
+    """Take a file or folder away for the time of the block, keeping its times."""
+    shutil.move(path, aside)
+    try:
+        yield
+    finally:
+        if path.is_dir():
+            shutil.rmtree(path)
+        shutil.move(aside, path)
+
+
+def test_nothing_runs_twice(built: Project) -> None:
+    assert built.plan() == set()
+
+
+def test_touching_everything_runs_nothing(built: Project) -> None:
+    for folder in ("recordings", "config", "schemas", "src", "workflow", "release"):
+        for path in (built.root / folder).rglob("*"):
+            if path.is_file():
+                os.utime(path)
+    assert built.plan() == set()
+
+
+def test_one_raw_sweep_reruns_its_own_sequence_and_tree(built: Project) -> None:
+    sweep = sorted((built.root / "recordings" / TOWN / "lidar_front").iterdir())[3]
+    content = sweep.read_bytes()
+    sweep.write_bytes(content + b"\0")
+    try:
+        assert built.plan() == chain(TOWN, *STAGES) | tree(GERMANY)
+    finally:
+        sweep.write_bytes(content)
+
+
+def test_a_removed_raw_image_reruns_its_own_sequence_and_tree(built: Project, tmp_path: Path) -> None:
+    image = sorted((built.root / "recordings" / TOWN / "camera_right").iterdir())[0]
+    with without(image, tmp_path / image.name):
+        assert built.plan() == chain(TOWN, *STAGES) | tree(GERMANY)
+
+
+def test_one_label_file_reruns_annotations_and_what_packs_them(built: Project) -> None:
+    label = next((built.root / "recordings" / TOWN / "annotations" / "labels").glob("*.txt"))
+    name = label.relative_to(built.root).as_posix()
+    text = label.read_text()
+    label.write_text(text + "1 0.5 0.5 0.1 0.1\n")
+    try:
+        assert built.plan() == chain(TOWN, "annotations", "splits", "package") | tree(GERMANY), name
+    finally:
+        label.write_text(text)
+
+
+def test_a_setting_of_one_stage_reruns_that_stage_and_its_dependents(built: Project) -> None:
+    expected = {(stage, id) for id in DRIVES for stage in ("wheels", "package")} | tree(GERMANY, ITALY)
+    with built.changed("config/config.yaml", "simulation:", "wheels: {knot_spacing_m: 0.25}\nsimulation:"):
+        assert built.plan() == expected
+
+
+def test_an_edited_module_reruns_the_stages_that_reach_it(built: Project) -> None:
+    expected = {(stage, id) for id in DRIVES for stage in ("wheels", "package")} | tree(GERMANY, ITALY)
+    source = "src/card/wheels/road_plane.py"
+    with built.changed(source, "import numpy as np\n", "import numpy as np\n\nEDITED = 1\n"):
+        assert built.plan() == expected
+
+
+def test_an_edited_comment_reruns_nothing(built: Project) -> None:
+    with built.changed(
+        "src/card/wheels/road_plane.py", "import numpy as np\n", "import numpy as np  # arrays\n"
+    ):
+        assert built.plan() == set()
+
+
+def test_a_subset_plans_only_its_sequences(built: Project) -> None:
+    assert built.plan("--config", f"sequences={TOWN}") == tree(GERMANY)
+    assert built.plan("--forceall", "--config", f"sequences={TOWN}") == (
+        chain(TOWN, "calibration", *STAGES, "simulate_drive")
+        | tree(GERMANY)
+        | {("simulate_session", f"2026-04-14-{part}") for part in ("start", "mid", "end")}
+        | {("simulate_survey", "2026-04-14")}
+    )
+
+
+def sheet_line(built: Project, id: str) -> str:
+    lines = (built.root / "config" / "sequences.tsv").read_text().splitlines(keepends=True)
+    return next(line for line in lines if line.startswith(f"{id}\t"))
+
+
+def test_a_removed_sequence_reassembles_its_tree_only(built: Project) -> None:
+    with built.changed("config/sequences.tsv", sheet_line(built, TOWN), ""):
+        assert built.plan() == tree(GERMANY)
+
+
+def test_a_quarantined_sequence_reassembles_its_tree_only(built: Project) -> None:
+    line = sheet_line(built, TOWN)
+    with built.changed("config/sequences.tsv", line, line.replace("\t-\n", "\tblurred by rain\n")):
+        assert built.plan() == tree(GERMANY)
+
+
+def test_an_added_sequence_runs_its_own_chain(built: Project) -> None:
+    added = "de_second_town"
+    line = sheet_line(built, TOWN)
+    shutil.copytree(built.root / "recordings" / TOWN, built.root / "recordings" / added)
+    try:
+        with built.changed("config/sequences.tsv", line, line + line.replace(TOWN, added)):
+            assert built.plan() == chain(added, "calibration", *STAGES) | tree(GERMANY)
+    finally:
+        shutil.rmtree(built.root / "recordings" / added)
+
+
+def test_another_country_moves_the_sequence_and_nothing_is_measured_again(built: Project) -> None:
+    line = sheet_line(built, TOWN)
+    with built.changed("config/sequences.tsv", line, line.replace("\tDE\t", "\tIT\t")):
+        assert built.plan() == chain(TOWN, "package") | tree(GERMANY, ITALY)
+
+
+def test_another_licence_of_a_country_repacks_its_sequences(built: Project) -> None:
+    german = [id for id in DRIVES if id.startswith("de_")]
+    with built.changed("config/licenses.yaml", "DE: CC-BY-4.0", "DE: CC-BY-NC-4.0"):
+        plan = built.plan()
+    assert plan == {("package", id) for id in german} | tree(ITALY)
+
+
+def test_a_ledger_row_moves_only_its_sequence(built: Project) -> None:
+    ledger = "config/ledger/splits.tsv"
+    line = next(x for x in (built.root / ledger).read_text().splitlines(keepends=True) if x.startswith(TOWN))
+    with built.changed(
+        ledger, line, line.replace(line.split("\t")[3], "test" if "train" in line else "train", 1)
+    ):
+        assert built.plan() == chain(TOWN, "splits") | tree(GERMANY)
+
+
+def test_a_lost_snakemake_folder_reruns_nothing(built: Project, tmp_path: Path) -> None:
+    with without(built.root / ".snakemake", tmp_path / "aside"):
+        assert built.plan() == set()
