@@ -42,6 +42,13 @@ def day_of(session: str) -> tuple[str, str]:
     return match[1], match[2]
 
 
+def session_start_ns(session: str) -> int:
+    """When a session begins: 8:00, 12:30 and 17:00 UTC, in ns since 1970."""
+    day, part = day_of(session)
+    hour = (8.0, 12.5, 17.0)[SESSIONS.index(part)]
+    return int(np.datetime64(day, "ns").astype(np.int64)) + round(hour * 3600) * 1_000_000_000
+
+
 def session_rig(session: str, seed: int, scale: str) -> Rig:
     """The car as it is in one session: the car of that day, moved a little by heat.
 

@@ -1,0 +1,71 @@
+"""A calibration session: the board before a standing car, a short drive, and what the team made of it."""
+
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from card.artifacts import atomic_folder, write_json
+from card.geometry import CameraModel, from_json, to_json
+from card.recording.laz import write_burst
+from card.simulation.board_images import BoardCameras, write_board_yaml
+from card.simulation.board_scene import board_quads, place_board, surroundings
+from card.simulation.board_sweep import TURN_NS, sweep
+from card.simulation.calibrations import (
+    delivered_calibration,
+    session_rig,
+    session_start_ns,
+    true_calibration,
+)
+from card.simulation.ego import ego_pixels
+from card.simulation.scales import scale_named
+
+VIEWS = {"tiny": 3, "demo": 12, "full": 500}
+"""Board views a session."""
+
+_TILT_DEG = 16.0
+_VIEW_NS = 2_000_000_000
+# An image lies inside its sweep: the board stands still for longer than a turn.
+_SWEEP_LEAD_NS = TURN_NS // 2
+
+
+def simulate_session(session: str, *, folder: Path, truth: Path, scale: str, seed: int) -> None:
+    """Write one session.
+
+    folder : gets board.yaml, camera_left|camera_right/<t_ns>.jpg, lidar_front/<t_ns>.laz, calibration.json
+        (what the team delivers), ego_mask.png.
+    truth : gets calibration.json and board_poses.json.
+    """
+    size, rig = scale_named(scale), session_rig(session, seed, scale)
+    rng = np.random.default_rng([seed, *session.encode()])
+    behind = surroundings(rng)
+    cameras = BoardCameras(rig, behind)
+    views: list[dict[str, Any]] = []
+    with atomic_folder(folder) as partial:
+        write_board_yaml(partial)
+        (partial / "lidar_front").mkdir()
+        for number in range(VIEWS[scale]):
+            rig_from_board = place_board(rig, cameras.ego, rng, tilt_deg=_TILT_DEG)
+            shown = board_quads(rig_from_board)
+            t_ns = session_start_ns(session) + number * _VIEW_NS
+            cameras.photograph(partial, shown, t_ns, rng)
+            burst = sweep(rig, [*behind, *shown], size.columns, t_ns - _SWEEP_LEAD_NS, rng)
+            write_burst(partial / "lidar_front" / f"{burst.t_ns}.laz", burst)
+            views.append({"folder": ".", "t_ns": t_ns, "rig_from_board": to_json(rig_from_board)})
+        calibration = delivered_calibration(session, seed, scale, views=VIEWS[scale])
+        write_json(partial / "calibration.json", calibration, "calibration")
+        cv2.imwrite(str(partial / "ego_mask.png"), ego_mask(calibration))
+    with atomic_folder(truth) as partial:
+        write_json(partial / "calibration.json", true_calibration(session, seed, scale), "calibration")
+        poses = {"schema": "board_poses", "views": views, "stations": []}
+        write_json(partial / "board_poses.json", poses, "board_poses")
+
+
+def ego_mask(calibration: dict[str, Any]) -> NDArray[np.uint8]:
+    """The mask (height, width) uint8 of the undistorted left image: 255 on the car and a rim around it."""
+    camera = CameraModel.from_json(calibration["camera_left_undistorted"])
+    body = ego_pixels(camera, from_json(calibration["extrinsics"]["rig_from_camera_left"]))
+    rim = max(1, camera.width // 200)
+    return np.asarray(cv2.dilate(body.astype(np.uint8) * 255, np.ones((2 * rim + 1,) * 2)), dtype=np.uint8)
