@@ -15,13 +15,14 @@ CONVERGED_M = 1e-7
 
 @dataclass(frozen=True)
 class SplineSettings:
-    """Knot spacing, final and first Tukey scale in metres, annealing factor, second-difference penalty."""
+    """Settings of the fit; see ``settings/wheels``."""
 
     knot_spacing_m: float
     tukey_m: float
     tukey_start_m: float
     anneal_factor: float
     penalty: float
+    penalty_anneal_power: float
 
 
 @dataclass(frozen=True)
@@ -60,17 +61,18 @@ def fit_profile(arc: Array, height: Array, settings: SplineSettings) -> tuple[Pr
 
     Minimises the sum of Tukey's loss over the heights plus the penalty times the squared second differences
     of the coefficients, by reweighted least squares (supplement, "Wheel Excitation"). The loss is annealed
-    from wide to narrow, because from a bad start the narrow one locks on to an outlier cluster.
+    from wide to narrow, because from a bad start the narrow one locks on to an outlier cluster, and the
+    spline is stiffer while the loss is wide, so that a cluster is outvoted by the road before and behind it.
     """
     start, spacing = float(arc.min()), settings.knot_spacing_m
     count = int(np.ceil((float(arc.max()) - start) / spacing)) + 3 if arc.max() > start else 4
     first, basis = uniform_basis(arc, start, spacing, count)
-    penalty = _penalty_band(count, settings.penalty)
     coefficients = np.zeros(count)
     scale = settings.tukey_start_m
     for _ in range(MAX_ITERATIONS):
         weights = tukey_weights(height - _evaluate(first, basis, coefficients), scale)
-        solution = _solve(first, basis, height, weights, penalty)
+        stiffness = (scale / settings.tukey_m) ** settings.penalty_anneal_power
+        solution = _solve(first, basis, height, weights, _penalty_band(count, settings.penalty * stiffness))
         step = float(np.abs(solution - coefficients).max())
         coefficients = solution
         if scale == settings.tukey_m and step < CONVERGED_M:
@@ -87,8 +89,8 @@ def _evaluate(first: NDArray[np.int64], basis: Array, coefficients: Array) -> Ar
     return value
 
 
-def _solve(first: NDArray[np.int64], basis: Array, height: Array, weights: Array, penalty: Array) -> Array:
-    band = penalty.copy()
+def _solve(first: NDArray[np.int64], basis: Array, height: Array, weights: Array, band: Array) -> Array:
+    """Coefficients (K,) of the normal equations, added to the lower `band` (4, K) of the penalty."""
     count = band.shape[1]
     right = np.zeros(count)
     for a in range(4):

@@ -1,0 +1,189 @@
+"""Contact paths, arc length and height of points, and the excitation read off them."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from card.artifacts import default_settings
+from card.geometry import Trajectory
+from card.wheels.arc_height import Corridor, corridor_samples, project
+from card.wheels.contact_path import ContactPath, contact_path
+from card.wheels.profile import SplineSettings
+from card.wheels.wheel_fit import GapSettings, fit_excitation
+
+Array = NDArray[np.float64]
+CONTACT = np.array([-0.8, 1.0, -1.7])
+STEP_M = 0.05
+
+
+def trajectory(along: Array, *, heave: Array | float = 0.0, euler_zxy: Array | None = None) -> Trajectory:
+    """A drive along world y at 100 Hz with `along` (N,) metres, and heave and attitude if any."""
+    n = len(along)
+    position = np.stack([np.zeros(n), along, np.full(n, 1.7) + heave], axis=1)
+    angles = np.zeros((n, 3)) if euler_zxy is None else euler_zxy
+    quaternion = Rotation.from_euler("ZXY", angles).as_quat()[:, [3, 0, 1, 2]]
+    return Trajectory(1_776_153_600_000_000_000 + np.arange(n) * 10_000_000, position, quaternion)
+
+
+def swaying() -> ContactPath:
+    n = 800
+    t = np.arange(n) / 100
+    euler = np.stack([0.15 * t, 0.02 * np.sin(2 * t), 0.03 * np.sin(1.5 * t)], axis=1)
+    return contact_path(trajectory(6 * t, heave=0.03 * np.sin(5 * t), euler_zxy=euler), CONTACT, STEP_M)
+
+
+def spline() -> SplineSettings:
+    defaults = default_settings("wheels")
+    return SplineSettings(**{name: defaults[name] for name in SplineSettings.__dataclass_fields__})
+
+
+def test_arc_length_and_height_follow_the_paper() -> None:
+    path = swaying()
+    rng = np.random.default_rng(0)
+    position, rotation, arc = path.knot_position, path.knot_rotation, path.knot_arc
+    points = position[rng.integers(3, len(position) - 3, 200)] + rng.normal(0, 0.1, (200, 3))
+    d, h, sideways = project(points, position, rotation, arc)
+    for n, p in enumerate(points):
+        distance = [float(np.linalg.norm(p - t)) for t in position]
+        # The two closest adjacent poses: the nearest and the nearer of its neighbours.
+        k = int(np.argmin(distance))
+        i = k if distance[k - 1] < distance[k + 1] else k + 1
+        step = position[i] - position[i - 1]
+        length = np.linalg.norm(step)
+        alpha = float(np.dot(step / length, p - position[i - 1]) / length)
+        local = [rotation[j].T @ (p - position[j]) for j in (i - 1, i)]
+        assert d[n] == pytest.approx((1 - alpha) * arc[i - 1] + alpha * arc[i], abs=1e-12)
+        assert h[n] == pytest.approx((1 - alpha) * local[0][2] + alpha * local[1][2], abs=1e-12)
+        assert sideways[n] == pytest.approx((1 - alpha) * local[0][0] + alpha * local[1][0], abs=1e-12)
+
+
+def test_surface_undoes_the_projection() -> None:
+    path = swaying()
+    arc = np.random.default_rng(1).uniform(1, path.knot_arc[-1] - 1, 300)
+    height = np.random.default_rng(2).uniform(-0.1, 0.1, 300)
+    points = path.surface(arc, height)
+    d, h, _ = project(points, path.knot_position, path.knot_rotation, path.knot_arc)
+    # Up is not quite square to the path: off the path d shifts by that slope, and h by slope times shift.
+    slope = 0.06
+    assert np.abs(d - arc).max() < slope * np.abs(height).max()
+    assert np.abs(h - height).max() < slope * np.abs(d - arc).max()
+    d, h, _ = project(path.surface(arc, 0 * arc), path.knot_position, path.knot_rotation, path.knot_arc)
+    np.testing.assert_allclose(d, arc, atol=1e-9)
+    np.testing.assert_allclose(h, 0, atol=1e-4)
+
+
+def test_standing_adds_no_arc_length() -> None:
+    drive = np.concatenate(
+        [np.linspace(0, 10, 200), 10 + 0.004 * np.sin(np.arange(300)), np.linspace(10, 20, 200)]
+    )
+    path = contact_path(trajectory(drive), CONTACT, STEP_M)
+    assert path.knot_arc[-1] == pytest.approx(20, abs=0.06)
+    assert np.diff(path.knot_arc).min() >= STEP_M
+    assert np.ptp(path.arc[205:495]) < 0.01
+    assert set(path.run) == {0}
+
+
+def test_a_car_that_never_moves_has_a_path() -> None:
+    path = contact_path(trajectory(np.zeros(50)), CONTACT, STEP_M)
+    excitation = fit_excitation(path, np.zeros(0), np.zeros(0), spline(), GapSettings(0.2, 3))
+    np.testing.assert_allclose(excitation.position, np.tile([-0.8, 1.0, 0.0], (50, 1)), atol=1e-12)
+    assert excitation.gap.all()
+
+
+def test_reverse_starts_a_run_and_takes_the_points_again() -> None:
+    drive = np.concatenate([np.linspace(0, 10, 200), np.linspace(10, 4, 120)[1:]])
+    path = contact_path(trajectory(drive), CONTACT, STEP_M)
+    assert path.knot_arc[-1] == pytest.approx(16, abs=0.1)
+    assert sorted(set(path.run)) == [0, 1]
+    points = np.array([[-0.8, 1.0 + 7.0, 0.02]])
+    arc, height = corridor_samples(points, path, (-100.0, 100.0), Corridor(0.12, 0.35))
+    np.testing.assert_allclose(np.sort(arc), [7, 13], atol=0.06)
+    np.testing.assert_allclose(height, 0.02, atol=1e-9)
+
+
+def test_a_second_pass_keeps_its_own_points() -> None:
+    """Around a block and back on the same street: a window takes a point only on its own pass."""
+    angle = np.linspace(0, 4 * np.pi, 4000)
+    radius = 30.0
+    n = len(angle)
+    position = np.stack([radius * (np.cos(angle) - 1), radius * np.sin(angle), np.full(n, 1.7)], axis=1)
+    position[:, 2] += 0.05 * (angle > 2 * np.pi)  # the second lap drifted up
+    quaternion = Rotation.from_rotvec(np.outer(angle, [0, 0, 1])).as_quat()[:, [3, 0, 1, 2]]
+    path = contact_path(Trajectory(np.arange(n) * 10_000_000, position, quaternion), CONTACT, STEP_M)
+    lap = path.knot_arc[-1] / 2
+    k = int(np.searchsorted(path.knot_arc, lap * 1.25))
+    point = path.knot_position[k : k + 1]
+    arc, height = corridor_samples(point, path, (1.1 * lap, 1.4 * lap), Corridor(0.12, 0.35))
+    np.testing.assert_allclose(arc, [path.knot_arc[k]], atol=1e-9)
+    np.testing.assert_allclose(height, [0], atol=1e-9)
+    arc, height = corridor_samples(point, path, (0.1 * lap, 0.4 * lap), Corridor(0.12, 0.35))
+    np.testing.assert_allclose(height, [0.05], atol=1e-6)
+
+
+def test_the_corridor_has_walls_and_ends() -> None:
+    path = contact_path(trajectory(np.linspace(0, 10, 200)), CONTACT, STEP_M)
+    base = np.array([-0.8, 6.0, 0.0])
+    inside = [[0.119, 0, 0], [-0.119, 0, 0], [0, 0, 0.349], [0, 0, -0.349]]
+    outside = [[0.121, 0, 0], [-0.121, 0, 0], [0, 0, 0.351], [0, -5.2, 0], [0, 5.2, 0]]
+    corridor = Corridor(0.12, 0.35)
+    arc, _ = corridor_samples(base + np.array(inside), path, (0, 20), corridor)
+    assert len(arc) == 4
+    arc, _ = corridor_samples(base + np.array(outside), path, (0, 20), corridor)
+    assert len(arc) == 0
+    arc, _ = corridor_samples(base + np.array(inside), path, (5.2, 20), corridor)
+    assert len(arc) == 0
+
+
+def road(y: Array) -> Array:
+    """A bump 6 cm high and 3 m long at y = 15 m on a flat road."""
+    return np.where(np.abs(y - 15) < 1.5, 0.03 * (1 + np.cos(np.pi * (y - 15) / 1.5)), 0.0)
+
+
+def test_a_bump_under_a_swaying_body_is_recovered() -> None:
+    t = np.arange(600) / 100
+    sway = 0.02 * np.sin(4 * t)
+    euler = np.stack([0 * t, 0.01 * np.sin(3 * t), 0.01 * np.sin(2 * t)], axis=1)
+    path = contact_path(trajectory(5 * t, heave=sway, euler_zxy=euler), CONTACT, STEP_M)
+    rng = np.random.default_rng(5)
+    y = rng.uniform(0, 31, 6000)
+    points = np.stack([-0.8 + rng.uniform(-0.15, 0.15, y.size), y, road(y)], axis=1)
+    arc, height = corridor_samples(points, path, (-1, 100), Corridor(0.12, 0.35))
+    found = fit_excitation(path, arc, height, spline(), GapSettings(0.2, 3))
+    inner = slice(20, -20)
+    error = found.position[inner, 2] - road(found.position[inner, 1])
+    assert np.abs(error).max() < 1e-3
+    assert not found.gap[inner].any()
+    assert np.nanmax(found.residual_m[inner]) < 2e-3
+
+
+def test_a_gap_is_flagged_and_the_rest_is_not() -> None:
+    path = contact_path(trajectory(np.linspace(0, 30, 600)), CONTACT, STEP_M)
+    arc = np.concatenate([np.linspace(2, 10, 400), np.linspace(14, 28, 700)])
+    found = fit_excitation(path, arc, np.full(arc.size, 0.03), spline(), GapSettings(0.2, 3))
+    gap = ((path.arc > 10.2) & (path.arc < 13.8)) | (path.arc < 1.8) | (path.arc > 28.2)
+    near = np.abs(np.subtract.outer(path.arc, [1.8, 10.2, 13.8, 28.2])).min(axis=1) < 0.05
+    np.testing.assert_array_equal(found.gap[~near], gap[~near])
+    assert np.isnan(found.residual_m[path.arc < 1.5]).all()
+    # Beyond the data the last height holds.
+    np.testing.assert_allclose(found.position[path.arc > 28.2, 2], 0.03, atol=1e-6)
+
+
+def test_a_dive_while_standing_leaves_the_road_where_it_is() -> None:
+    along = np.concatenate([np.linspace(0, 10, 200), np.full(200, 10.0)])
+    dive = np.concatenate([np.zeros(200), 0.02 * np.sin(np.arange(200) / 10)])
+    path = contact_path(trajectory(along, heave=dive), CONTACT, STEP_M)
+    arc = np.linspace(0, 10, 1000)
+    found = fit_excitation(path, arc, np.full(arc.size, 0.01), spline(), GapSettings(0.2, 3))
+    np.testing.assert_allclose(found.position[10:, 2], 0.01, atol=1e-5)
+
+
+def test_contacts_between_samples_are_interpolated() -> None:
+    path = contact_path(trajectory(np.linspace(0, 10, 200)), CONTACT, STEP_M)
+    arc = np.linspace(0, 10, 1000)
+    found = fit_excitation(path, arc, np.zeros(arc.size), spline(), GapSettings(0.2, 3))
+    position, gap = found.at(path.t_ns[[40, 80]] + 5_000_000)
+    np.testing.assert_allclose(
+        position, (found.position[[40, 80]] + found.position[[41, 81]]) / 2, atol=1e-12
+    )
+    assert not gap.any()

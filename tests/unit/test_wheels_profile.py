@@ -1,0 +1,123 @@
+"""The robust spline against scipy's optimizer, a known bump, clusters and gaps."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline
+from scipy.optimize import least_squares
+
+from card.artifacts import default_settings
+from card.wheels.profile import SplineSettings, fit_profile, tukey_weights, uniform_basis
+
+Array = NDArray[np.float64]
+
+
+def settings(**changes: float) -> SplineSettings:
+    defaults = default_settings("wheels") | changes
+    return SplineSettings(**{name: defaults[name] for name in SplineSettings.__dataclass_fields__})
+
+
+def bump(arc: Array) -> Array:
+    """A speed bump: a raised cosine, 8 cm high and 4 m long, at 20 m."""
+    inside = np.abs(arc - 20) < 2
+    return np.where(inside, 0.04 * (1 + np.cos(np.pi * (arc - 20) / 2)), 0.0)
+
+
+def test_basis_agrees_with_scipy() -> None:
+    arc = np.linspace(1.0, 3.0, 57)
+    first, basis = uniform_basis(arc, 1.0, 0.2, 13)
+    coefficients = np.random.default_rng(0).normal(size=13)
+    spline = BSpline(1.0 + 0.2 * np.arange(-3, 14), coefficients, 3)
+    np.testing.assert_allclose(
+        (basis * coefficients[first[:, None] + np.arange(4)]).sum(axis=1), spline(arc), atol=1e-14
+    )
+
+
+def test_agrees_with_least_squares_and_a_tukey_loss() -> None:
+    rng = np.random.default_rng(1)
+    arc = np.sort(rng.uniform(0, 8, 600))
+    height = 0.03 * np.sin(2 * arc) + rng.normal(0, 0.004, arc.size)
+    height[::9] += rng.uniform(0.06, 0.3, height[::9].size)
+    chosen = settings()
+    profile, weight = fit_profile(arc, height, chosen)
+    assert 0 < np.count_nonzero(weight == 0) < 100
+
+    count = len(profile.coefficients)
+    knots = profile.start_m + profile.spacing_m * np.arange(-3, count + 1)
+    design = BSpline.design_matrix(arc, knots, 3).toarray()
+    second = np.sqrt(chosen.penalty) * np.diff(np.eye(count), 2, axis=0)
+    scale = chosen.tukey_m
+
+    def residuals(coefficients: Array) -> Array:
+        return np.concatenate([design @ coefficients - height, second @ coefficients])
+
+    def loss(z: Array) -> Array:
+        """Tukey for the heights, plain squares for the penalty; z = squared residual over scale^2."""
+        inside = np.maximum(0.0, 1 - z)
+        rho = np.stack([(1 - inside**3) / 3, inside**2, -2 * inside])
+        rho[:, arc.size :] = np.stack([z[arc.size :], np.ones(count - 2), np.zeros(count - 2)])
+        return rho
+
+    witness = least_squares(
+        residuals, profile.coefficients + 0.002, loss=loss, f_scale=scale, xtol=1e-14, ftol=1e-15, gtol=1e-14
+    )
+    assert witness.success
+    np.testing.assert_allclose(profile.coefficients, witness.x, atol=1e-5)
+
+
+def test_recovers_a_bump_from_exact_points() -> None:
+    arc = np.random.default_rng(2).uniform(0, 40, 4000)
+    profile, _ = fit_profile(arc, bump(arc), settings())
+    at = np.linspace(0.5, 39.5, 2000)
+    assert np.abs(profile.at(at) - bump(at)).max() < 1e-3
+
+
+def test_noise_averages_out() -> None:
+    rng = np.random.default_rng(3)
+    arc = rng.uniform(0, 40, 8000)
+    profile, _ = fit_profile(arc, bump(arc) + rng.normal(0, 0.008, arc.size), settings())
+    at = np.linspace(0.5, 39.5, 2000)
+    assert np.sqrt(np.mean((profile.at(at) - bump(at)) ** 2)) < 2e-3
+
+
+def test_outlier_clusters_do_not_pull() -> None:
+    rng = np.random.default_rng(4)
+    arc = rng.uniform(0, 40, 6000)
+    height = bump(arc) + rng.normal(0, 0.004, arc.size)
+    # A passing wheel: 45 % of the points of a stretch lie together, 20 cm up; dust everywhere.
+    cluster = (np.abs(arc - 10) < 1) & (rng.uniform(size=arc.size) < 0.45)
+    height[cluster] = 0.2 + rng.normal(0, 0.01, np.count_nonzero(cluster))
+    dust = rng.uniform(size=arc.size) < 0.08
+    height[dust] = rng.uniform(0, 0.35, np.count_nonzero(dust))
+    profile, weight = fit_profile(arc, height, settings())
+    at = np.linspace(0.5, 39.5, 2000)
+    assert np.abs(profile.at(at) - bump(at)).max() < 5e-3
+    assert not weight[cluster & ~dust].any()
+
+    soft, _ = fit_profile(arc, height, settings(penalty_anneal_power=0.0))
+    assert np.abs(soft.at(at) - bump(at)).max() > 0.1
+    unannealed, _ = fit_profile(arc, height, settings(tukey_start_m=1e3, tukey_m=1e3))
+    assert np.abs(unannealed.at(at) - bump(at)).max() > 0.05
+
+
+def test_a_stretch_without_points_is_bridged_smoothly() -> None:
+    arc = np.concatenate([np.linspace(0, 10, 500), np.linspace(13, 20, 350)])
+    profile, _ = fit_profile(arc, 0.01 * arc, settings(tukey_start_m=2.0))
+    np.testing.assert_allclose(profile.at([11, 12]), [0.11, 0.12], atol=1e-4)
+
+
+@pytest.mark.parametrize("count", [1, 2, 5])
+def test_few_points_still_give_a_profile(count: int) -> None:
+    profile, weight = fit_profile(np.full(count, 3.0), np.full(count, 0.1), settings())
+    assert profile.at(3.0) == pytest.approx(0.1, abs=1e-3)
+    assert (weight > 0.9).all()
+
+
+def test_tukey_weight_is_the_slope_of_its_loss() -> None:
+    r, scale, step = np.linspace(-0.06, 0.06, 41), 0.04, 1e-7
+
+    def half_loss(r: Array) -> Array:
+        return scale**2 / 6 * (1 - np.maximum(0, 1 - (r / scale) ** 2) ** 3)
+
+    slope = (half_loss(r + step) - half_loss(r - step)) / (2 * step)
+    np.testing.assert_allclose(tukey_weights(r, scale) * r, slope, atol=1e-8)
