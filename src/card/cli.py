@@ -24,9 +24,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         required=True, metavar="ACTION"
     )
     extend = splits.add_parser("extend", help="append rows for new sequences")
-    extend.add_argument("--sheet", type=Path, default=Path("config/sequences.tsv"))
-    extend.add_argument("--licenses", type=Path, default=Path("config/licenses.yaml"))
-    extend.add_argument("--ledger", type=Path, default=Path("config/ledger/splits.tsv"))
+    extend.add_argument("--config", type=Path, default=Path("config/config.yaml"))
     extend.add_argument("--results", type=Path, default=Path("results"))
     extend.set_defaults(run=_extend)
 
@@ -55,21 +53,22 @@ def _validate(options: argparse.Namespace) -> None:
 
 
 def _extend(options: argparse.Namespace) -> None:
-    from card.artifacts import default_settings
-    from card.packaging.licenses import read_licenses
+    from card.artifacts import load_schema, read_yaml
+    from card.artifacts.schemas import with_defaults
     from card.recording.sheet import read_sequences
     from card.splits.extend import extend_ledger
 
-    countries = read_licenses(options.licenses)["countries"]
+    settings = with_defaults(read_yaml(options.config, "config"), load_schema("config"))
+    countries = read_yaml(Path(settings["licenses"]), "licenses")["countries"]
     rows = extend_ledger(
-        sequences=[sequence.as_dict() for sequence in read_sequences(options.sheet, countries)],
+        sequences=[sequence.as_dict() for sequence in read_sequences(Path(settings["sheet"]), countries)],
         results=options.results,
-        ledger=options.ledger,
-        settings=default_settings("splits"),
+        ledger=Path(settings["splits_ledger"]),
+        settings=settings["splits"],
     )
     for row in rows:
         print("\t".join(row.cells()))
-    print(f"{len(rows)} rows appended to {options.ledger}")
+    print(f"{len(rows)} rows appended to {settings['splits_ledger']}")
 
 
 def _summary(options: argparse.Namespace) -> None:

@@ -24,6 +24,7 @@ from card.packaging.reader import Release
 
 SHIPPED_SCHEMAS = (
     "calibration",
+    "ground_truth_points",
     "imu",
     "poses",
     "provenance",
@@ -76,12 +77,11 @@ def assemble(
         for name in SHIPPED_SCHEMAS:
             shutil.copyfile(schemas / f"{name}.schema.json", tree / "schemas" / f"{name}.schema.json")
 
-        about = settings["release"]
         document = {
             "schema": "release",
             "repository": repository,
-            "version": about["version"],
-            "date": about["date"],
+            "version": settings["release"]["version"],
+            "date": settings["release"]["date"],
             "spdx": spdx,
             "commercial": terms["commercial"],
             "sequences": [item["id"] for item in ordered],
@@ -92,10 +92,18 @@ def assemble(
         }
         write_json(tree / "release.json", document, "release")
         write_pages(
-            tree, templates=release_folder, release=document, sequences=rows, terms=terms, about=about
+            tree,
+            templates=release_folder,
+            release=document,
+            sequences=rows,
+            terms=terms,
+            about=settings["release"],
+            has_mini=bool(mini["frame"]),
         )
         hashes |= _hash_rest(tree, hashes)
-        write_json(tree / "croissant.json", croissant(document, terms, about, hashes), "croissant")
+        write_json(
+            tree / "croissant.json", croissant(document, terms, settings["release"], hashes), "croissant"
+        )
         hashes["croissant.json"] = sha256_file(tree / "croissant.json")
         sums = "".join(f"{sha256}  {path}\n" for path, sha256 in sorted(hashes.items()))
         (tree / "SHA256SUMS").write_text(sums, encoding="utf-8")

@@ -32,7 +32,7 @@ def frame_columns(
     rows = []
     for row in frames:
         frame = row["frame"]
-        known = covered.get(frame, {})
+        known = covered.get(frame, {}) if frame in packed.get("ground_truth", ()) else {}
         rows.append(
             {
                 "sequence": sequence["id"],
@@ -52,9 +52,10 @@ def frame_columns(
                 "label_state": state_of.get(frame, "not_reviewed"),
                 "boxes_positive": counts[frame, "positive"],
                 "boxes_negative": counts[frame, "negative"],
-                "gt_points": known.get("points"),
-                "gt_before_s": known.get("before_s"),
-                "gt_after_s": known.get("after_s"),
+                "gt_points": known.get("points_saved"),
+                "gt_image_share": known.get("image_share"),
+                "gt_window_share": known.get("window_share"),
+                "gt_flag": known.get("flag"),
                 "spdx": spdx,
             }
         )

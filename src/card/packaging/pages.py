@@ -23,6 +23,7 @@ def write_pages(
     sequences: Sequence[Mapping[str, Any]],
     terms: Mapping[str, Any],
     about: Mapping[str, str],
+    has_mini: bool,
 ) -> None:
     """Write all pages into `tree`.
 
@@ -32,6 +33,7 @@ def write_pages(
     release : document `release`; sequences : rows of the sequence table.
     terms : the licence's entry of `config/licenses.yaml`.
     about : title, creator, contact and url from the settings.
+    has_mini : whether `mini.parquet` has rows.
     """
     values = {
         **about,
@@ -46,7 +48,7 @@ def write_pages(
         "commercial": "Commercial use is permitted."
         if terms["commercial"]
         else "Commercial use is not permitted.",
-        "front_matter": yaml.safe_dump(front_matter(release, about["title"]), sort_keys=False),
+        "front_matter": yaml.safe_dump(front_matter(release, about["title"], has_mini), sort_keys=False),
         "counts": _counts(release, sequences),
         "split_table": _table(("split", "frames"), [(split, release["frames"][split]) for split in SPLITS]),
         "sequence_table": _table(
@@ -77,30 +79,33 @@ def write_pages(
     (tree / "LICENSE").write_bytes((templates / "licenses" / terms["text"]).read_bytes())
 
 
-def front_matter(release: Mapping[str, Any], title: str) -> dict[str, Any]:
-    """YAML of the dataset card: Parquet configs only, each with its files by name."""
+def front_matter(release: Mapping[str, Any], title: str, has_mini: bool) -> dict[str, Any]:
+    """YAML of the dataset card: Parquet configs only, each with its files by name.
+
+    A table without rows is left out, because `datasets` refuses to load a whole config for one empty
+    split; its file is in the tree all the same.
+    """
     frames = sum(release["frames"].values())
+    files = {
+        "frames": {s: f"metadata/frames-{s}.parquet" for s in SPLITS if release["frames"][s]},
+        "sequences": {"full": "metadata/sequences.parquet"} if release["sequences"] else {},
+        "members": {"full": "metadata/members.parquet"} if release["files"] else {},
+        "mini": {"full": "mini/mini.parquet"} if has_mini else {},
+    }
+    configs: list[dict[str, Any]] = [
+        {"config_name": name, "data_files": [{"split": s, "path": path} for s, path in listed.items()]}
+        for name, listed in files.items()
+        if listed
+    ]
+    if configs:
+        configs[0]["default"] = True
     return {
         "pretty_name": title,
         "license": release["spdx"].lower(),
         "task_categories": ["depth-estimation", "object-detection"],
         "tags": ["autonomous-driving", "road-topography", "lidar", "stereo"],
         "size_categories": [next((name for limit, name in SIZES if frames < limit), "n>1M")],
-        "configs": [
-            {
-                "config_name": "frames",
-                "default": True,
-                "data_files": [
-                    {"split": split, "path": f"metadata/frames-{split}.parquet"} for split in SPLITS
-                ],
-            },
-            {
-                "config_name": "sequences",
-                "data_files": [{"split": "all", "path": "metadata/sequences.parquet"}],
-            },
-            {"config_name": "members", "data_files": [{"split": "all", "path": "metadata/members.parquet"}]},
-            {"config_name": "mini", "data_files": [{"split": "all", "path": "mini/mini.parquet"}]},
-        ],
+        "configs": configs,
     }
 
 

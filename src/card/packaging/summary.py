@@ -39,7 +39,7 @@ def summarize(release: Path) -> str:
         ]
     if waiting := _without_split(trees):
         lines.append(
-            f"no split yet: {', '.join(waiting)}; run `snakemake assign_splits`, commit the ledger and build again"
+            f"no split yet: {', '.join(waiting)}; run `snakemake assign_splits`, commit the ledger, release"
         )
     lines.append("look at: " + ", ".join(str(tree / "README.md") for tree in trees))
     return "\n".join(lines)

@@ -20,7 +20,6 @@ from card.packaging.checks.splits import check_splits
 from card.packaging.checks.tables import check_tables
 
 CHECKS = (check_files, check_tables, check_members, check_geometry, check_licenses, check_card_page)
-CONFIGS = ("frames", "sequences", "members", "mini")
 logger = logging.getLogger("card")
 
 
@@ -80,7 +79,7 @@ def _check_loading(tree: Path) -> list[str]:
 
     findings = []
     with tempfile.TemporaryDirectory() as cache, _quiet(datasets):
-        for config in CONFIGS:
+        for config in datasets.get_dataset_config_names(str(tree)):
             try:
                 datasets.load_dataset(str(tree), config, cache_dir=cache)
             except Exception as error:  # whatever a user would meet

@@ -22,9 +22,12 @@ def check_card_page(contents: Contents) -> Iterator[str]:
     except yaml.YAMLError as error:
         yield f"README.md: YAML is broken ({' '.join(str(error).split())})"
         return
-    wanted = front_matter(contents.release, found.get("pretty_name", "") if isinstance(found, dict) else "")
+    if not isinstance(found, dict):
+        yield "README.md: YAML is not a mapping"
+        return
+    wanted = front_matter(contents.release, found.get("pretty_name", ""), bool(contents.mini))
     for name, value in wanted.items():
-        if not isinstance(found, dict) or found.get(name) != value:
+        if found.get(name) != value:
             yield f"README.md: {name} of the YAML is not as the release calls for"
     for line in parts[2].splitlines():
         if "$" in line:
