@@ -1,0 +1,139 @@
+"""Cars and walkers, each in a frame of its own: origin on the ground below its middle, y ahead, z up."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from card.geometry import transform
+from card.simulation.faces_and_plates import FACE_SIZE_M, PLATE_SIZE_M
+from card.simulation.mesh import Mesh, box, cylinder, ellipsoid, grid, join, mesh, picture
+from card.simulation.surfaces import Surface
+
+Array = NDArray[np.float64]
+
+CAR_LENGTH_M, CAR_WIDTH_M = 4.4, 1.8
+EYE_HEIGHT_M = 1.60
+_PLATE_GAP_M = 0.015
+
+#: Side view of a car: (y, z) of the body's outline and of the cabin on top of it.
+_CAR_BODY = [(-2.2, 0.32), (-2.2, 0.85), (-1.9, 0.98), (1.0, 0.95), (2.0, 0.78), (2.2, 0.62), (2.2, 0.32)]
+_CAR_CABIN = [(-1.95, 0.96), (-1.45, 1.42), (0.05, 1.45), (1.0, 0.94)]
+
+
+def car(colour: ArrayLike, plates: tuple[int, int]) -> Mesh:
+    """A car 4.4 m long whose front and rear plates are the things ``plates``."""
+    half = CAR_WIDTH_M / 2
+    parts = [
+        _extruded(_CAR_BODY, half, half, Surface.CAR_BODY, colour),
+        _extruded(_CAR_CABIN, half - 0.08, half - 0.28, Surface.CAR_GLASS),
+        box((-half + 0.28, -1.40, 1.425), (half - 0.28, 0.02, 1.47), Surface.CAR_BODY, colour),
+        _plate(np.array([0.0, CAR_LENGTH_M / 2 + _PLATE_GAP_M, 0.50]), 1.0, plates[0]),
+        _plate(np.array([0.0, -CAR_LENGTH_M / 2 - _PLATE_GAP_M, 0.70]), -1.0, plates[1]),
+    ]
+    for side in (-half + 0.02, half - 0.02):
+        for y in (-1.35, 1.35):
+            parts.append(cylinder((side - 0.1, y, 0.33), (side + 0.1, y, 0.33), (0.33, 0.33), Surface.TYRE))
+        for y, colour_lamp in ((-2.205, (1.0, 0.05, 0.05)), (2.205, (1.0, 1.0, 0.9))):
+            x = 0.75 * side
+            parts.append(
+                box((x - 0.14, y - 0.01, 0.66), (x + 0.14, y + 0.01, 0.80), Surface.CAR_BODY, colour_lamp)
+            )
+    return join(parts)
+
+
+def ego_body() -> Mesh:
+    """Our own car in ``rig``: hood, windscreen, roof and flanks."""
+    outline = [
+        (-2.95, -1.35), (-2.95, -0.75), (-2.35, -0.10), (-0.15, -0.10), (0.70, -0.66), (1.45, -0.80),
+        (1.62, -0.98), (1.66, -1.35),
+    ]  # fmt: skip
+    low = [(y, min(z, -0.66)) for y, z in outline]
+    return join(
+        [
+            _extruded(low, 0.94, 0.94, Surface.CAR_BODY, (0.10, 0.11, 0.13)),
+            _extruded(outline[1:5], 0.88, 0.62, Surface.CAR_BODY, (0.10, 0.11, 0.13)),
+        ]
+    )
+
+
+def walker(colours: Array, face: int, head_turn: float, height: float) -> Mesh:
+    """Trunk, arms and head of a walker ``height`` m tall with face ``face``, looking ``head_turn`` rad left.
+
+    colours : (2, 3) albedo of shirt and trousers. Legs are parts of their own, see `leg`.
+    """
+    k = height / 1.75
+    head = join(
+        [
+            ellipsoid((0, -0.015, 0), (0.088, 0.105, 0.13), Surface.SKIN, (0.35, 0.3, 0.28)),
+            _face_patch(face),
+        ]
+    )
+    c, s = np.cos(head_turn / 2), np.sin(head_turn / 2)
+    parts = [
+        ellipsoid((0, 0, 1.17), (0.20, 0.13, 0.34), Surface.CLOTH, colours[0]),
+        cylinder((0, 0, 1.42), (0, 0, 1.53), (0.06, 0.06), Surface.SKIN),
+        head.moved(transform((0, 0, EYE_HEIGHT_M), (c, 0, 0, s))),
+    ]
+    for side in (-1, 1):
+        parts.append(
+            cylinder(
+                (0.21 * side, 0, 1.40), (0.27 * side, 0.08, 0.85), (0.06, 0.045), Surface.CLOTH, colours[0]
+            )
+        )
+    return join(parts).moved(np.diag([k, k, k, 1.0]))
+
+
+def leg(colour: ArrayLike, height: float) -> Mesh:
+    """One leg, origin at the hip, hanging down."""
+    k = height / 1.75
+    parts = [
+        cylinder((0, 0, 0.05), (0, 0, -0.88), (0.09, 0.055), Surface.CLOTH, colour),
+        box((-0.05, -0.07, -0.92), (0.05, 0.18, -0.85), Surface.TYRE),
+    ]
+    return join(parts).moved(np.diag([k, k, k, 1.0]))
+
+
+def _extruded(
+    outline: list[tuple[float, float]],
+    half_low: float,
+    half_high: float,
+    surface: Surface,
+    tint: ArrayLike = (1.0, 1.0, 1.0),
+) -> Mesh:
+    """A side view (y, z) made solid; its half width goes from ``half_low`` at the bottom to ``half_high``."""
+    yz = np.array(outline)
+    share = (yz[:, 1] - yz[:, 1].min()) / np.ptp(yz[:, 1])
+    half = half_low + share * (half_high - half_low)
+    left, right = np.column_stack([-half, yz]), np.column_stack([half, yz])
+    count = len(yz)
+    ring = np.arange(count)
+    after = np.roll(ring, -1)
+    skin = np.concatenate(
+        [np.stack([ring, after, ring + count], 1), np.stack([after, after + count, ring + count], 1)]
+    )
+    caps = np.array([[0, i, i + 1] for i in range(1, count - 1)])
+    return mesh(np.concatenate([left, right]), np.concatenate([skin, caps, caps + count]), surface, tint)
+
+
+def _plate(centre: Array, facing: float, thing: int) -> Mesh:
+    """A plate that looks along +y (facing 1) or -y (facing -1); its text reads from outside."""
+    height, width = PLATE_SIZE_M
+    right = np.array([-facing, 0.0, 0.0])
+    up = np.array([0.0, 0.0, 1.0])
+    corners = [
+        centre + x * width / 2 * right + z * height / 2 * up for x, z in ((-1, 1), (1, 1), (1, -1), (-1, -1))
+    ]
+    return picture(corners, Surface.PLATE, thing)
+
+
+def _face_patch(thing: int) -> Mesh:
+    """A slightly curved patch in front of the head, seen from +y."""
+    height, width = FACE_SIZE_M
+    u = np.linspace(0, 1, 7)
+    x = (0.5 - u) * width
+    y = np.sqrt(0.16**2 - x**2) - 0.16 + 0.105
+    z = np.array([height / 2, 0.0, -height / 2])
+    points = np.stack(np.broadcast_arrays(x, y, z[:, None]), axis=-1)
+    uv = np.stack(np.broadcast_arrays(u, np.array([[0.0], [0.5], [1.0]])), axis=-1)
+    patch = grid(points, Surface.FACE, uv=uv)
+    patch.thing[:] = thing
+    return patch

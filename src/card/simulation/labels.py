@@ -1,0 +1,113 @@
+"""The labels a careful person would draw, from what each pixel really shows."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from card.geometry import CameraModel, apply, inverse
+from card.simulation.irregularities import Irregularity, Pothole
+from card.simulation.road import Road
+from card.simulation.traffic import Thing
+
+Array = NDArray[np.float64]
+
+CLASSES = ("positive", "negative")
+#: What is smaller than this nobody labels: visible pixels and a box's shorter side.
+_FEWEST_PX, _SMALLEST_BOX_PX = 12, 3.0
+_OUTLINE_STEPS = 25
+
+
+@dataclass(frozen=True)
+class Box:
+    """A box in an original image, its edges in px (a pixel spans -0.5..0.5 about its centre).
+
+    kind : positive, negative, face or plate.  thing : index of what it shows.  visible : its pixels in sight.
+    """
+
+    kind: str
+    thing: int
+    x_min: float
+    y_min: float
+    x_max: float
+    y_max: float
+    visible: int
+
+
+def private_boxes(seen: NDArray[np.int32], things: Sequence[Thing]) -> list[Box]:
+    """Boxes around the visible pixels of faces and plates in an image of thing indices (H, W)."""
+    boxes = []
+    for index in np.unique(seen[seen >= 0]):
+        kind = things[index].kind
+        if kind not in ("face", "plate"):
+            continue
+        rows, columns = np.nonzero(seen == index)
+        box = Box(
+            kind,
+            int(index),
+            columns.min() - 0.5,
+            rows.min() - 0.5,
+            columns.max() + 0.5,
+            rows.max() + 0.5,
+            len(rows),
+        )
+        if _worth_labelling(box):
+            boxes.append(box)
+    return boxes
+
+
+def road_boxes(
+    seen: NDArray[np.int32], road: Road, camera: CameraModel, world_from_camera: Array
+) -> list[Box]:
+    """Boxes around the whole extent, cut at the image's edge, of the bumps and potholes in sight."""
+    boxes = []
+    for index, thing in enumerate(road.irregularities):
+        visible = int(np.count_nonzero(seen == index))
+        if visible < _FEWEST_PX:
+            continue
+        points = apply(inverse(world_from_camera), outline(road, thing))
+        # The lens model folds back far outside the image: keep to what is in front and near the view.
+        ahead = points[(points[:, 2] > 0.3) & (np.abs(points[:, 0]) < 1.2 * points[:, 2])]
+        if not len(ahead):
+            continue
+        pixels = camera.project(ahead)
+        x_min, y_min = np.maximum(pixels.min(axis=0), -0.5)
+        x_max, y_max = np.minimum(pixels.max(axis=0), (camera.width - 0.5, camera.height - 0.5))
+        kind = CLASSES[isinstance(thing, Pothole)]
+        box = Box(kind, index, float(x_min), float(y_min), float(x_max), float(y_max), visible)
+        if _worth_labelling(box):
+            boxes.append(box)
+    return boxes
+
+
+def outline(road: Road, thing: Irregularity) -> Array:
+    """World points (N, 3) of an irregularity's surface."""
+    s_min, s_max, d_min, d_max = thing.extent
+    s, d = np.meshgrid(
+        np.linspace(s_min, s_max, _OUTLINE_STEPS),
+        np.linspace(d_min, d_max, 4 * _OUTLINE_STEPS),
+        indexing="ij",
+    )
+    raised = np.abs(thing.height(s, d)) > 1e-4
+    return road.xyz(s[raised], d[raised])
+
+
+def yolo_lines(boxes: Sequence[Box], camera: CameraModel) -> list[str]:
+    """Lines ``class x_center y_center width height`` of a YOLO file, in shares of the image."""
+    lines = []
+    for box in boxes:
+        x, y = (box.x_min + box.x_max) / 2 + 0.5, (box.y_min + box.y_max) / 2 + 0.5
+        values = (
+            x / camera.width,
+            y / camera.height,
+            (box.x_max - box.x_min) / camera.width,
+            (box.y_max - box.y_min) / camera.height,
+        )
+        lines.append(" ".join([str(CLASSES.index(box.kind)), *(f"{v:.6f}" for v in values)]))
+    return lines
+
+
+def _worth_labelling(box: Box) -> bool:
+    smaller = min(box.x_max - box.x_min, box.y_max - box.y_min)
+    return box.visible >= _FEWEST_PX and smaller >= _SMALLEST_BOX_PX

@@ -1,0 +1,96 @@
+"""What stands beside a road: houses, poles, trees and parked cars."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from card.simulation.mesh import Mesh, box, cylinder, join, mesh
+from card.simulation.road import Road
+from card.simulation.surfaces import Surface
+
+Array = NDArray[np.float64]
+FOUNDATION_M = 1.0
+
+
+def houses(road: Road, span: tuple[float, float], depth: float, rng: np.random.Generator) -> list[Mesh]:
+    """Rows of houses on both sides over arc lengths ``span`` (m), ``depth`` m deep, with a few gaps."""
+    found = []
+    for side in (-1.0, 1.0):
+        s = span[0] + rng.uniform(0, 4)
+        while s < span[1]:
+            length, height = rng.uniform(8, 15), rng.uniform(6, 12)
+            if rng.random() < 0.85:
+                found.append(_house(road, s + length / 2, side, length, height, depth, rng))
+            s += length + rng.choice([0.0, 0.0, 2.5])
+    return found
+
+
+def poles(road: Road, span: tuple[float, float], rng: np.random.Generator) -> list[Mesh]:
+    """Street lamps every 22 m or so, on alternating sides."""
+    found = []
+    for index, s in enumerate(np.arange(span[0], span[1], 22.0)):
+        side = -1.0 if index % 2 else 1.0
+        offset = side * (road.section.half_width + 0.45)
+        lamp = join(
+            [
+                cylinder((0, 0, -0.3), (0, 0, 5.5), (0.07, 0.05), Surface.POLE),
+                cylinder((0, 0, 5.5), (-side * 1.2, 0, 5.7), (0.04, 0.04), Surface.POLE),
+            ]
+        )
+        found.append(lamp.moved(road.pose(s + rng.uniform(-2, 2), offset)))
+    return found
+
+
+def trees(road: Road, span: tuple[float, float], spacing: float, rng: np.random.Generator) -> list[Mesh]:
+    """Trees and bushes beyond the road's edge, ``spacing`` m apart on average on each side."""
+    found = []
+    for side in (-1.0, 1.0):
+        for s in np.arange(span[0], span[1], spacing):
+            offset = side * (road.section.reach + rng.uniform(-0.5, 5.0))
+            plant = _bush(rng) if rng.random() < 0.3 else _tree(rng)
+            pose = road.pose(s + rng.uniform(-0.4, 0.4) * spacing, np.sign(offset) * road.section.reach)
+            pose[:3, 3] += pose[:3, 0] * (offset - np.sign(offset) * road.section.reach)
+            pose[2, 3] -= 0.3
+            found.append(plant.moved(pose))
+    return found
+
+
+def _house(
+    road: Road, s: float, side: float, length: float, height: float, depth: float, rng: np.random.Generator
+) -> Mesh:
+    tint = rng.uniform(0.75, 1.15) * rng.uniform(0.85, 1.1, 3)
+    low, high = (0.0, -length / 2, -FOUNDATION_M), (depth, length / 2, height)
+    eaves = 0.35
+    walls = box(low, high, Surface.FACADE, tint)
+    roof = box((-eaves, -length / 2, height), (depth + eaves, length / 2, height + 0.8), Surface.ROOF, tint)
+    pose = road.pose(s, side * (road.section.reach + 0.2), 0.0 if side > 0 else np.pi)
+    return join([walls, roof]).moved(pose)
+
+
+def _tree(rng: np.random.Generator) -> Mesh:
+    height = rng.uniform(2.2, 3.2)
+    crown = np.array([rng.uniform(1.3, 2.2), 0.0, rng.uniform(1.5, 2.6)])
+    crown[1] = crown[0]
+    return join(
+        [
+            cylinder((0, 0, -0.5), (0, 0, height + 1.0), (0.18, 0.10), Surface.TRUNK),
+            _leaves(np.array([0, 0, height + 0.7 * crown[2]]), crown, 320, rng),
+        ]
+    )
+
+
+def _bush(rng: np.random.Generator) -> Mesh:
+    radii = rng.uniform(0.5, 1.1, 3)
+    return _leaves(np.array([0, 0, 0.3 + 0.7 * radii[2]]), radii, 160, rng)
+
+
+def _leaves(centre: Array, radii: Array, count: int, rng: np.random.Generator) -> Mesh:
+    """Loose triangles in an ellipsoid: vegetation that lets some rays through."""
+    direction = rng.normal(size=(count, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    middle = direction * np.cbrt(rng.uniform(0.25, 1, (count, 1))) * radii
+    corners = middle[:, None] + rng.normal(0, 0.09 + 0.07 * radii.mean(), (count, 3, 3))
+    leaves = mesh(
+        corners.reshape(-1, 3) + centre, np.arange(3 * count), Surface.FOLIAGE, rng.uniform(0.8, 1.2, 3)
+    )
+    leaves.tint[:] *= rng.uniform(0.6, 1.3, (count, 1)).astype(np.float32)
+    return leaves

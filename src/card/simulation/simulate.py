@@ -1,0 +1,106 @@
+"""One drive from nothing to files: the raw recording as a car would leave it, and the truth beside it."""
+
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from card.artifacts import atomic_folder, check, progress, write_arrays, write_table
+from card.geometry import Trajectory
+from card.recording.laz import write_burst
+from card.recording.paths import burst_path, imu_path
+from card.simulation.bodies import ego_body
+from card.simulation.footprint import wheel_contacts
+from card.simulation.imu import ImuErrors, imu_times, measured_imu
+from card.simulation.lidar import Lidar, burst_starts
+from card.simulation.photographs import write_photographs
+from card.simulation.raycast import Scene, Tracer
+from card.simulation.rig import LIDARS, WHEELS
+from card.simulation.trajectory_delivery import write_trajectory
+from card.simulation.world import World, build_world
+
+
+def simulate_drive(drive: str, *, recording: Path, truth: Path, scale: str, seed: int) -> None:
+    """Write the raw recording of a demo drive to ``recording`` and its truth to ``truth``.
+
+    Parameters
+    ----------
+    drive : id of one of `drives.DRIVES`.
+    scale : ``tiny``, ``demo`` or ``full``.
+    seed : makes the world; the same seed gives the same bytes.
+
+    Raises
+    ------
+    CardError
+        For an unknown drive or scale, or if a folder cannot be written; a folder appears whole or not at all.
+    """
+    world = build_world(drive, scale, seed)
+    with atomic_folder(truth) as truth_part, atomic_folder(recording) as recording_part:
+        native = recording_part
+        path = _write_motion(world, native, truth_part)
+        tracer, ego = Tracer(world.static, world.movers), Scene(ego_body())
+        for lidar in LIDARS:
+            _write_bursts(world, tracer, ego, lidar, native, truth_part)
+        write_photographs(world, tracer, ego, native, truth_part)
+        _write_description(world, native)
+        write_trajectory(recording_part, path, seed=seed)
+
+
+def _write_motion(world: World, recording: Path, truth: Path) -> Trajectory:
+    """IMU table, true trajectory, wheels and mesh; the true trajectory at IMU rate is returned."""
+    times = imu_times(world.start_ns, world.scale.duration_s)
+    write_table(imu_path(recording), measured_imu(world.path, times, ImuErrors(), world.rng("imu")), "imu")
+    rows = np.searchsorted(world.path.t_ns, times)
+    path = Trajectory(times, world.path.translation_m[rows], world.path.rotation_wxyz[rows])
+    write_table(truth / "trajectory.parquet", path.to_table(), "trajectory")
+    guess = np.interp((times - world.start_ns) * 1e-9, world.course.t, world.course.s)
+    contacts = [wheel_contacts(world.road, path, world.rig.wheel_contact_m[wheel], guess) for wheel in WHEELS]
+    columns = {
+        "wheel": np.repeat(WHEELS, len(times)),
+        "t_ns": np.tile(times, len(WHEELS)),
+        **{axis: np.concatenate([c[:, i] for c in contacts]) for i, axis in enumerate("xyz")},
+        **{f"q{axis}": np.tile(path.rotation_wxyz[:, i], len(WHEELS)) for i, axis in enumerate("wxyz")},
+    }
+    write_table(truth / "wheels.parquet", columns, "truth_wheels")
+    mesh = world.static
+    write_arrays(
+        truth / "world.npz",
+        {"vertices": mesh.vertices, "triangles": mesh.triangles, "surface": mesh.surface},
+        "truth_world",
+    )
+    return path
+
+
+def _write_bursts(world: World, tracer: Tracer, ego: Scene, lidar: str, recording: Path, truth: Path) -> None:
+    sensor = Lidar(world, tracer, ego, lidar)
+    (recording / lidar).mkdir(parents=True)
+    starts = burst_starts(lidar, world.start_ns, world.scale.duration_s)
+    for number, t_ns in enumerate(progress(starts, f"{world.name} {lidar}")):
+        burst, met = sensor.scan(t_ns, number)
+        write_burst(burst_path(recording, lidar, t_ns), burst)
+        arrays = {"dynamic": met.dynamic, "range_m": met.range_m, "surface": met.surface}
+        write_arrays(truth / "bursts" / lidar / f"{t_ns}.npz", arrays, "truth_burst")
+
+
+def _write_description(world: World, recording: Path) -> None:
+    clock = {"clock": "synchronised"}
+    period = 100_000_000 // world.scale.columns
+    lidar = {"model": "PandarXT-32", **clock, "deskewed": False, "column_period_ns": period}
+    camera = {"model": "simulated 5 MP global shutter", **clock}
+    document = {
+        "id": world.name,
+        "rig": "simulated-macan",
+        "day": world.drive.day,
+        "place": world.drive.place,
+        "country": world.drive.country,
+        "sensors": {
+            "camera_left": camera,
+            "camera_right": camera,
+            "lidar_front": lidar,
+            "lidar_rear": lidar,
+            "imu": {"model": "simulated MEMS, 200 Hz", **clock},
+        },
+    }
+    check(document, "recording", recording / "recording.yaml")
+    text = yaml.safe_dump(document, sort_keys=False)
+    (recording / "recording.yaml").write_text(text, encoding="utf-8")

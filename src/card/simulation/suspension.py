@@ -1,0 +1,46 @@
+"""A quarter car's response: how much of the ground's motion reaches the body."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class QuarterCar:
+    """One mode of the body on its wheels: the body's frequency (Hz) and damping ratio, and the wheels'.
+
+    ``mass_ratio`` is unsprung over sprung mass, ``tyre_hz`` the sprung mass's frequency on the tyres alone.
+    """
+
+    body_hz: float
+    damping: float
+    mass_ratio: float = 0.09
+    tyre_hz: float = 3.4
+
+    def transfer(self) -> tuple[Array, Array]:
+        """Numerator and denominator in s of body over road: two masses, a spring and damper, a tyre's spring.
+
+        x_s / z = k_t (c s + k) / ((m_s s^2 + c s + k)(m_u s^2 + c s + k + k_t) - (c s + k)^2), for m_s = 1.
+        """
+        k = (2 * np.pi * self.body_hz) ** 2
+        c = 2 * self.damping * 2 * np.pi * self.body_hz
+        tyre = (2 * np.pi * self.tyre_hz) ** 2
+        spring = np.array([c, k])
+        body, wheel = np.array([1.0, c, k]), np.array([self.mass_ratio, c, k + tyre])
+        return tyre * spring, np.polysub(np.polymul(body, wheel), np.polymul(spring, spring))
+
+
+HEAVE = QuarterCar(body_hz=1.3, damping=0.35)
+PITCH = QuarterCar(body_hz=1.5, damping=0.35)
+ROLL = QuarterCar(body_hz=1.4, damping=0.40)
+
+
+def sprung(ground: Array, mode: QuarterCar, step_s: float) -> Array:
+    """The body's motion (N,) on a ground motion (N,) sampled every ``step_s``, at rest before its start."""
+    from scipy.signal import bilinear, lfilter
+
+    b, a = bilinear(*mode.transfer(), fs=1.0 / step_s)
+    return np.asarray(lfilter(b, a, ground - ground[0]) + ground[0])

@@ -1,0 +1,187 @@
+"""Everything a drive's sensors meet: road, houses, traffic, and the car's own way through it."""
+
+import zlib
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from card.geometry import Trajectory, inverse, quaternion_from_matrix, transform
+from card.simulation import scenery
+from card.simulation.calibrations import session_rig
+from card.simulation.centreline import CentreLine, circuit, winding
+from card.simulation.drives import Drive, drive_named
+from card.simulation.irregularities import Bump, Irregularity, Pothole, pothole
+from card.simulation.mesh import Mesh, join
+from card.simulation.raycast import Mover
+from card.simulation.rig import Rig
+from card.simulation.road import Road, hills
+from card.simulation.road_mesh import land_mesh, road_mesh
+from card.simulation.scales import Scale, scale_named
+from card.simulation.spectrum import roughness
+from card.simulation.traffic import Thing, Traffic
+from card.simulation.vehicle import Course, Lane, course, ride
+
+Array = NDArray[np.float64]
+
+_BEHIND_M, _AHEAD_M = 60.0, 130.0
+
+
+@dataclass(frozen=True)
+class World:
+    """One drive before any sensor has looked at it.
+
+    path : true ``world_from_rig`` at 1 kHz, beginning before and ending after the recording.
+    static : the mesh of all that stands still.  movers : all that moves.
+    things : what labels are drawn around; the first ones are the road's irregularities.
+    sun : (3,) unit vector towards it.
+    """
+
+    name: str
+    drive: Drive
+    scale: Scale
+    seed: int
+    rig: Rig
+    start_ns: int
+    road: Road
+    course: Course
+    path: Trajectory
+    static: Mesh
+    movers: list[Mover]
+    things: list[Thing]
+    sun: Array
+
+    def rng(self, purpose: str) -> np.random.Generator:
+        """A random stream of its own for each purpose."""
+        return _rng(self.seed, self.name, purpose)
+
+
+def build_world(name: str, scale: str, seed: int) -> World:
+    """The world of one demo drive at one scale; any seed makes a new one."""
+    drive, size = drive_named(name), scale_named(scale)
+    day_ns = int(np.datetime64(drive.day, "ns").astype(np.int64))
+    start_ns = day_ns + round(drive.starts * 3600) * 1_000_000_000
+    begin = size.camera_start_s
+    where = course([(t + begin, v) for t, v in drive.speeds], 0.0, size.duration_s)
+
+    rng = _rng(seed, name, "road")
+    line = _line(drive, where, rng)
+    road = Road(
+        line,
+        drive.section,
+        hills(rng),
+        roughness(drive.road_class, rng, line.length if line.closed else None),
+        _irregularities(drive, line, where.at(begin), rng),
+        np.eye(4),
+    )
+    lane = Lane(drive.section.lane, 0.12, 65.0 if not line.closed else line.length / 3, rng.uniform(0, 6))
+    path = ride(road, lane, where, start_ns)
+    world_from_map = _level(inverse(path.at(start_ns)))
+    road = road.placed(world_from_map)
+    path = Trajectory(path.t_ns, *_parts(world_from_map @ path.at(path.t_ns)))
+
+    things = [Thing("bump" if isinstance(t, Bump) else "pothole") for t in road.irregularities]
+    traffic = Traffic(drive, road, where, start_ns, _rng(seed, name, "traffic"), things)
+    traffic.populate(begin, size.duration_s)
+    static = join(
+        [*_ground(road, where), *_scenery(drive, road, _rng(seed, name, "scenery")), *traffic.parked]
+    )
+    light = _rng(seed, name, "light")
+    azimuth, elevation = light.uniform(0, 2 * np.pi), np.radians(light.uniform(35, 60))
+    sun = np.array(
+        [np.cos(elevation) * np.sin(azimuth), np.cos(elevation) * np.cos(azimuth), np.sin(elevation)]
+    )
+    rig = session_rig(drive.session, seed, scale)
+    return World(
+        name, drive, size, seed, rig, start_ns, road, where, path, static, traffic.movers, things, sun
+    )
+
+
+def _line(drive: Drive, where: Course, rng: np.random.Generator) -> CentreLine:
+    if drive.circuit is not None:
+        return circuit(*drive.circuit)
+    return winding(float(where.s[-1]) + _BEHIND_M + _AHEAD_M, -_BEHIND_M, drive.bend, rng)
+
+
+def _irregularities(
+    drive: Drive, line: CentreLine, camera_s: float, rng: np.random.Generator
+) -> tuple[Irregularity, ...]:
+    """Bumps and potholes all along; the cameras' excerpt always starts before one of each kind the drive has."""
+    edge = drive.section.half_width
+    first, last = line.start + 4, line.start + line.length - 4
+    found: list[Irregularity] = []
+    for s in _spots(camera_s + 8.0, drive.bump_spacing, line, first, last, rng):
+        if drive.section.paved and rng.random() < 0.5:
+            length, rise, profile = rng.uniform(3.6, 4.6), rng.uniform(0.07, 0.10), "flat"
+        else:
+            length, rise, profile = rng.uniform(1.0, 2.0), rng.uniform(0.04, 0.07), "round"
+        found.append(Bump(s, 0.15 - edge, edge - 0.15, length, rise, profile))
+    for s in _spots(camera_s + 12.5, drive.pothole_spacing, line, first, last, rng):
+        d = drive.section.lane + rng.choice([-0.84, 0.84]) + rng.uniform(-0.25, 0.25)
+        d = float(np.clip(d, 0.6 - edge, edge - 0.6))
+        if all(abs(s - other.s) > 3.5 for other in found if isinstance(other, Bump)):
+            found.append(pothole(s, d, rng))
+    return tuple(_apart(found))
+
+
+def _spots(
+    start: float, spacing: float, line: CentreLine, first: float, last: float, rng: np.random.Generator
+) -> list[float]:
+    if not spacing:
+        return []
+    steps = np.arange(np.ceil((first - start) / spacing), np.floor((last - start) / spacing) + 1)
+    jitter = np.where(steps == 0, 0.0, rng.uniform(-0.25, 0.25, len(steps)))
+    spots = start + (steps + jitter) * spacing
+    return [float(s) for s in spots if first < s < last]
+
+
+def _apart(things: list[Irregularity]) -> list[Irregularity]:
+    """Without potholes whose meshes would overlap."""
+    kept: list[Irregularity] = []
+    for thing in things:
+        if isinstance(thing, Pothole) and any(
+            abs(thing.s - k.s) < 1.8 for k in kept if isinstance(k, Pothole)
+        ):
+            continue
+        kept.append(thing)
+    return kept
+
+
+def _ground(road: Road, where: Course) -> list[Mesh]:
+    line = road.line
+    whole = (line.start, line.start + line.length)
+    fine = whole
+    if not line.closed:
+        whole = (whole[0] + 1, whole[1] - 1)
+        fine = (where.at(0.0) - 15, float(where.s[-1]) + 20)
+    s = np.arange(*whole, 5.0)
+    return [road_mesh(road, fine, whole), land_mesh(road, road.xyz(s, 0 * s)[:, :2])]
+
+
+def _scenery(drive: Drive, road: Road, rng: np.random.Generator) -> list[Mesh]:
+    span = (road.line.start + 2, road.line.start + road.line.length - 2)
+    found: list[Mesh] = []
+    if drive.house_depth:
+        found += scenery.houses(road, span, drive.house_depth, rng)
+    if drive.section.kerb:
+        found += scenery.poles(road, span, rng)
+    if drive.tree_spacing:
+        found += scenery.trees(road, span, drive.tree_spacing, rng)
+    return found
+
+
+def _level(rig_from_map: Array) -> Array:
+    """``world_from_map``: shift and turn about z that put the first rig pose at the origin, ahead on +y."""
+    map_from_rig = inverse(rig_from_map)
+    forward = map_from_rig[:2, 1]
+    yaw = np.arctan2(-forward[0], forward[1])
+    turn = transform((0, 0, 0), (np.cos(yaw / 2), 0, 0, -np.sin(yaw / 2)))
+    return turn @ transform(-map_from_rig[:3, 3])
+
+
+def _parts(pose: Array) -> tuple[Array, Array]:
+    return pose[:, :3, 3], quaternion_from_matrix(pose[:, :3, :3])
+
+
+def _rng(seed: int, name: str, purpose: str) -> np.random.Generator:
+    return np.random.default_rng([seed, zlib.crc32(f"{name}/{purpose}".encode())])
