@@ -77,7 +77,7 @@ def read_ledger(path: Path) -> list[Row]:
 def append_rows(path: Path, rows: Iterable[Row]) -> None:
     """Add `rows` at the end of the ledger; what stands in it keeps its bytes."""
     old = path.read_text(encoding="utf-8")
-    new = old + "".join("\t".join(row.cells()) + "\n" for row in rows)
+    new = old + "\n" * (not old.endswith("\n")) + "".join("\t".join(row.cells()) + "\n" for row in rows)
     check_append_only(old, new)
     with atomic_file(path) as temporary:
         temporary.write_text(new, encoding="utf-8")
