@@ -20,6 +20,15 @@ from card.privacy.markers import sanitized
 from card.privacy.recall import read_labels
 from card.privacy.redaction import redact
 
+HAAR_SETTINGS = (
+    "face_cascades",
+    "plate_cascades",
+    "scale_step",
+    "min_neighbors",
+    "face_growth",
+    "plate_growth",
+)
+
 
 def anonymize(
     *,
@@ -76,8 +85,7 @@ def anonymize(
 
 
 def _detector(settings: Mapping[str, Any]) -> Detector:
-    names = ("face_cascades", "plate_cascades", "scale_step", "min_neighbors", "growth")
-    return HaarDetector(**{name: settings[name] for name in names})
+    return HaarDetector(**{name: settings[name] for name in HAAR_SETTINGS})
 
 
 def _jobs(recording: Path, table: Any, folder: Path) -> list[Job]:

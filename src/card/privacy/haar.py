@@ -21,7 +21,8 @@ class HaarDetector:
     face_cascades, plate_cascades : names of cascade files in OpenCV's data folder, without ``.xml``.
     scale_step : factor (> 1) between neighbouring sizes of the image pyramid.
     min_neighbors : raw windows that must agree on a box; this count is the score.
-    growth : share of a box's width and height added on each side.
+    face_growth, plate_growth : share of a box's width and height added on each side. A face cascade marks
+        brows to chin, a plate cascade the characters.
 
     Raises ``CardError`` for a cascade that the installed OpenCV does not have.
     """
@@ -35,14 +36,15 @@ class HaarDetector:
         plate_cascades: Sequence[str],
         scale_step: float,
         min_neighbors: int,
-        growth: float,
+        face_growth: float,
+        plate_growth: float,
     ) -> None:
         # Worker processes share the cores already, and one thread keeps the boxes in one order.
         cv2.setNumThreads(1)
         self.version = cv2.__version__
         self._scale_step = scale_step
         self._min_neighbors = min_neighbors
-        self._growth = growth
+        self._growth: dict[Kind, float] = {"face": face_growth, "plate": plate_growth}
         self._cascades: list[tuple[Kind, str, Any]] = []
         models: dict[str, str] = {}
         kinds: tuple[tuple[Kind, Sequence[str]], ...] = (("face", face_cascades), ("plate", plate_cascades))
@@ -68,7 +70,7 @@ class HaarDetector:
             found += [
                 Detection(
                     kind, x - 0.5, y - 0.5, x + width - 0.5, y + height - 0.5, score=float(count), source=name
-                ).grown(self._growth)
+                ).grown(self._growth[kind])
                 for x, y, width, height, count in rows
             ]
         return found
