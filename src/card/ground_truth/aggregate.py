@@ -1,0 +1,180 @@
+"""Quasi-dense ground truth of a sequence: the reference path in plain numpy (paper, supplement A-E)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from card.artifacts import (
+    atomic_folder,
+    inventory,
+    load_schema,
+    progress,
+    read_json,
+    read_table,
+    write_arrays,
+    write_table,
+)
+from card.errors import CardError
+from card.geometry import Trajectory
+from card.ground_truth.coverage import frame_window
+from card.ground_truth.frame import build_frame
+from card.ground_truth.left_camera import LeftCamera
+from card.ground_truth.static_set import StaticSet, static_voxels
+from card.ground_truth.static_window import StaticWindow
+from card.ground_truth.summary import write_summary
+from card.ground_truth.sweeps import Drive
+from card.ground_truth.voxels import unpack
+
+
+def aggregate(
+    *,
+    recording: Path,
+    bursts: Path,
+    frames: Path,
+    calibration: Path,
+    ego_mask: Path,
+    trajectory: Path,
+    out: Path,
+    report: Path,
+    settings: Mapping[str, Any],
+    gates: Sequence[Mapping[str, Any]],
+    threads: int,
+) -> None:
+    """Write the folder `out`: a cloud a frame, the static voxels, the coverage and an inventory.
+
+    Parameters
+    ----------
+    recording : folder with the bursts; bursts, frames : tables of schemas ``bursts`` and ``frames``.
+    calibration, ego_mask, trajectory : the session's calibration and mask, poses at IMU rate.
+    settings : schema ``settings/ground_truth``, filled. gates : limits for figures of the report.
+    threads : processes that work on frames; the bytes do not depend on it.
+
+    Raises
+    ------
+    CardError
+        If the poses do not cover a burst or a frame, a burst comes twice, or the ego mask does not fit.
+    """
+    document = read_json(calibration, "calibration")
+    camera = LeftCamera(document, ego_mask)
+    poses = Trajectory.from_table(read_table(trajectory, "trajectory"))
+    drive = Drive(recording, bursts, document, poses, settings)
+    tasks = _tasks(frames, drive)
+    static = static_voxels(drive, settings)
+    with atomic_folder(out) as folder:
+        work = _Work(drive, static, camera, settings, folder)
+        rows = list(progress(_rows(work, tasks, threads), "frames", total=len(tasks)))
+        _write_static(folder / "static_voxels.npz", static)
+        columns = {name: [row[name] for row in rows] for name in load_schema("coverage")["columns"]}
+        write_table(folder / "coverage.parquet", columns, "coverage")
+        write_table(folder / "inventory.parquet", inventory(folder), "inventory")
+    inputs = {
+        "bursts": bursts,
+        "frames": frames,
+        "calibration": calibration,
+        "ego_mask": ego_mask,
+        "trajectory": trajectory,
+    }
+    write_summary(report, drive.id, static.why, rows, inputs, settings, gates)
+
+
+@dataclass(frozen=True)
+class _Task:
+    frame: int
+    t_ns: int
+    keyframe: int  # ordinal in the drive, -1 for none
+
+
+@dataclass(frozen=True)
+class _Work:
+    drive: Drive
+    static: StaticSet
+    camera: LeftCamera
+    settings: Mapping[str, Any]
+    folder: Path
+
+    def rows(self, tasks: Sequence[_Task]) -> Iterator[dict[str, Any]]:
+        """Write the clouds of consecutive frames; yield their rows of schema ``coverage``."""
+        window = StaticWindow(self.drive, self.static)
+        for task in tasks:
+            selected = frame_window(self.drive, task.t_ns, task.keyframe >= 0, self.settings)
+            keyframe = self.drive.sweep(task.keyframe).points if task.keyframe >= 0 else np.empty((0, 3))
+            frame = build_frame(
+                window.cloud(selected.bursts),
+                keyframe,
+                task.keyframe,
+                self.drive.trajectory.at(task.t_ns),
+                self.static,
+                self.camera,
+                self.settings,
+            )
+            write_arrays(
+                self.folder / f"{task.frame:06d}.npz", {"points": frame.points}, "ground_truth_points"
+            )
+            pixels = len(np.unique(frame.pixels, axis=0))
+            share = pixels / (self.camera.image.width * self.camera.image.height)
+            yield {"frame": task.frame, **selected.columns, **frame.counts, "image_share": share}
+
+
+def _tasks(frames: Path, drive: Drive) -> list[_Task]:
+    table = read_table(frames, "frames")
+    front = {int(drive.index[i]): int(i) for i in drive.of(True)}
+    tasks = []
+    for frame, t_ns, burst in zip(
+        *(table[name].to_pylist() for name in ("frame", "t_ns", "lidar_front_burst")), strict=True
+    ):
+        if not drive.trajectory.start_ns <= t_ns <= drive.trajectory.end_ns:
+            raise CardError(
+                "poses do not cover the image",
+                where=f"{frames}, frame {frame}",
+                found=t_ns,
+                wanted=f"{drive.trajectory.start_ns}..{drive.trajectory.end_ns} ns",
+            )
+        if burst is not None and burst not in front:
+            raise CardError(
+                "frame names a burst that is not there", where=f"{frames}, frame {frame}", found=burst
+            )
+        tasks.append(_Task(frame, t_ns, -1 if burst is None else front[burst]))
+    return tasks
+
+
+# Set before the processes fork: they inherit it, nothing is pickled.
+_inherited: list[_Work] = []
+
+
+def _rows(work: _Work, tasks: list[_Task], threads: int) -> Iterator[dict[str, Any]]:
+    if threads < 2 or len(tasks) < 2:
+        yield from work.rows(tasks)
+        return
+    # Consecutive frames share most of their bursts, so each process takes one run of them.
+    runs = [tasks[at[0] : at[-1] + 1] for at in np.array_split(np.arange(len(tasks)), threads) if len(at)]
+    _inherited.append(work)
+    try:
+        with ProcessPoolExecutor(len(runs), mp_context=get_context("fork")) as pool:
+            for rows in pool.map(_run, runs):
+                yield from rows
+    finally:
+        _inherited.pop()
+
+
+def _run(tasks: list[_Task]) -> list[dict[str, Any]]:
+    return list(_inherited[-1].rows(tasks))
+
+
+def _write_static(path: Path, static: StaticSet) -> None:
+    write_arrays(
+        path,
+        {
+            "origin": static.grid.origin,
+            "voxel_size": np.float64(static.grid.size),
+            "ids": unpack(static.keys).astype(np.int32),
+            "counts": static.counts,
+        },
+        "static_voxels",
+    )

@@ -1,0 +1,70 @@
+"""The static voxels of a drive: voting, rigidity, dynamic pruning (paper, supplement A-C)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from card.artifacts import progress
+from card.ground_truth.icp_flow import dynamic_by_flow, flow_votes
+from card.ground_truth.quotas import meets_quotas
+from card.ground_truth.sweeps import Drive
+from card.ground_truth.visibility_votes import dynamic_by_visibility, evidence_sweeps, visibility_votes
+from card.ground_truth.voxel_map import build_voxel_map
+from card.ground_truth.voxels import VoxelGrid
+
+
+@dataclass(frozen=True)
+class StaticSet:
+    """keys: (V,) increasing. counts: (V,) int32 points of the drive. why: voxels lost to each test."""
+
+    grid: VoxelGrid
+    keys: npt.NDArray[np.int64]
+    counts: npt.NDArray[np.int32]
+    why: dict[str, int]
+
+
+def static_voxels(drive: Drive, settings: Mapping[str, Any]) -> StaticSet:
+    """The global static voxel set, computed once a drive.
+
+    With `flow_method` "literal" or "off" the quotas decide, as in the paper, and "literal" prunes by ICP
+    flow. With "visibility" a voxel that both LiDARs hit is kept unless its votes contradict it.
+    """
+    grid = VoxelGrid.around(drive.trajectory, settings["voxel_size_m"])
+    why = {"points_at_sensor_origin": 0, "points_cropped": 0, "points": 0}
+    voxels = build_voxel_map(_stream(drive, why), drive.origins, grid, settings)
+    quotas = meets_quotas(voxels.front_views, voxels.rear_views, voxels.baseline, settings)
+    rigid = voxels.extents <= settings["rigidity_m"]
+    method = settings["flow_method"]
+    candidate = (voxels.hit_by_both if method == "visibility" else quotas) & rigid
+    chosen = np.flatnonzero(candidate)
+    dynamic = np.zeros(len(chosen), dtype=np.bool_)
+    if method == "visibility":
+        sweeps = evidence_sweeps(drive, settings["flow_baseline_m"], settings["evidence_step"])
+        votes = visibility_votes(drive, progress(sweeps, "moved votes"), voxels, chosen, settings)
+        dynamic = dynamic_by_visibility(votes, quotas[chosen], settings)
+    elif method == "literal":
+        dynamic = dynamic_by_flow(flow_votes(drive, voxels, settings), settings)[chosen]
+    static = chosen[~dynamic]
+    why |= {
+        "voxels": len(voxels.keys),
+        "voxels_hit_by_both": int(voxels.hit_by_both.sum()),
+        "voxels_quotas_met": int(quotas.sum()),
+        "voxels_not_rigid": int((~rigid).sum()),
+        "voxels_dynamic": int(dynamic.sum()),
+        "voxels_static": len(static),
+    }
+    return StaticSet(grid, voxels.keys[static], voxels.counts[static], why)
+
+
+def _stream(drive: Drive, why: dict[str, int]) -> Iterator[tuple[int, bool, npt.NDArray[np.float64]]]:
+    for i in progress(range(len(drive)), "voxel map"):
+        sweep = drive.sweep(i)
+        why["points_at_sensor_origin"] += sweep.at_origin
+        why["points_cropped"] += sweep.cropped
+        why["points"] += len(sweep.points)
+        yield i, bool(drive.front[i]), sweep.points

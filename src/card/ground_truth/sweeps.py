@@ -1,0 +1,157 @@
+"""The bursts of a drive as world points: read, cropped, motion-compensated (paper, supplement A)."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from card.artifacts import read_table, read_yaml
+from card.errors import CardError
+from card.estimation.deskew import deskew_burst
+from card.geometry import Trajectory, from_json
+from card.recording.burst import Burst
+from card.recording.laz import read_burst
+from card.recording.paths import LIDARS, description_path
+
+FRONT, REAR = LIDARS
+#: World points kept between passes; a short drive is then read only once.
+CACHE_POINTS = 30_000_000
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """The points of a burst that take part.
+
+    points: (N, 3) float64 world, metres. time_ns: (N,) int64. ring: (N,) uint8.
+    at_origin, cropped: points dropped because they lie at the sensor's origin, or by the crop.
+    """
+
+    points: npt.NDArray[np.float64]
+    time_ns: npt.NDArray[np.int64]
+    ring: npt.NDArray[np.uint8]
+    at_origin: int
+    cropped: int
+
+
+class Drive:
+    """The bursts of both LiDARs in the fixed order (end time, sensor, index), read when asked for.
+
+    start_ns, end_ns: (B,) int64. front: (B,) bool. index: (B,) int32, number among its sensor's bursts.
+    origins: (B, 3) float64, world, metres: where the sensor was at the burst's end.
+    """
+
+    def __init__(
+        self,
+        recording: Path,
+        bursts: Path,
+        calibration: Mapping[str, Any],
+        trajectory: Trajectory,
+        settings: Mapping[str, Any],
+    ) -> None:
+        table = read_table(bursts, "bursts")
+        lidar = np.array(table["lidar"].to_pylist(), dtype=object)
+        columns = {name: table[name].to_numpy() for name in ("t_start_ns", "t_end_ns", "burst")}
+        order = np.lexsort((columns["burst"], lidar == REAR, columns["t_end_ns"]))
+        self.front: npt.NDArray[np.bool_] = (lidar == FRONT)[order]
+        self.start_ns, self.end_ns, self.index = (column[order] for column in columns.values())
+        files = table["file"].to_pylist()
+        self.files = [recording / files[i] for i in order]
+        self.trajectory = trajectory
+        self._settings = settings
+        self._rig_from = {s: from_json(calibration["extrinsics"][f"rig_from_{s}"]) for s in LIDARS}
+        self._corrections = calibration["lidar_corrections"]
+        description = read_yaml(description_path(recording), "recording")
+        self.id: str = description["id"]
+        sensors = description["sensors"]
+        self._deskewed = {s: bool(sensors.get(s, {}).get("deskewed", False)) for s in LIDARS}
+        self._check(bursts)
+        rig_origins = np.array([self._rig_from[self.sensor(i)][:3, 3] for i in range(len(self))])
+        poses = trajectory.at(self.end_ns)
+        self.origins = np.einsum("bij,bj->bi", poses[:, :3, :3], rig_origins.reshape(-1, 3)) + poses[:, :3, 3]
+        self._cache: OrderedDict[int, Sweep] = OrderedDict()
+        self._cached_points = 0
+
+    def __len__(self) -> int:
+        return len(self.files)
+
+    def sensor(self, i: int) -> str:
+        """Name of the LiDAR of burst `i`."""
+        return FRONT if self.front[i] else REAR
+
+    def of(self, front: bool) -> npt.NDArray[np.int64]:
+        """Ordinals of one LiDAR's bursts, in order."""
+        return np.flatnonzero(self.front == front)
+
+    def poses(self, i: int, t_ns: npt.NDArray[np.int64]) -> npt.NDArray[np.float64]:
+        """world_from_lidar (M, 4, 4) of the sensor of burst `i` at times (M,)."""
+        return self.trajectory.at(t_ns) @ self._rig_from[self.sensor(i)]
+
+    def sweep(self, i: int) -> Sweep:
+        """The world points of burst `i`."""
+        if i in self._cache:
+            self._cache.move_to_end(i)
+            return self._cache[i]
+        sweep = self._read(i)
+        self._cache[i] = sweep
+        self._cached_points += len(sweep.points)
+        while self._cached_points > CACHE_POINTS and len(self._cache) > 1:
+            self._cached_points -= len(self._cache.popitem(last=False)[1].points)
+        return sweep
+
+    def _read(self, i: int) -> Sweep:
+        burst, lidar = read_burst(self.files[i]), self.sensor(i)
+        real = np.linalg.norm(burst.points, axis=1) >= self._settings["min_range_m"]
+        inside = _crop(burst.points, self._settings["front_crop" if self.front[i] else "rear_crop"])
+        keep = real & inside
+        part = replace(
+            burst,
+            points=burst.points[keep],
+            intensity=burst.intensity[keep],
+            ring=burst.ring[keep],
+            offset_ns=burst.offset_ns[keep],
+        )
+        world = self._world(part, lidar, int(self.end_ns[i]))
+        return Sweep(world, part.time_ns, part.ring, int((~real).sum()), int((real & ~inside).sum()))
+
+    def _world(self, burst: Burst, lidar: str, end_ns: int) -> npt.NDArray[np.float64]:
+        if self._deskewed[lidar]:
+            # The crop may have taken the last point, whose time is that of the pose.
+            burst = replace(burst, t_ns=end_ns, offset_ns=np.zeros_like(burst.offset_ns))
+        return deskew_burst(
+            burst,
+            self._rig_from[lidar],
+            self.trajectory,
+            self._corrections[lidar],
+            motion_compensate=not self._deskewed[lidar],
+        )
+
+    def _check(self, bursts: Path) -> None:
+        outside = np.flatnonzero(
+            (self.start_ns < self.trajectory.start_ns) | (self.end_ns > self.trajectory.end_ns)
+        )
+        if len(outside):
+            i = outside[0]
+            raise CardError(
+                f"poses do not cover {len(outside)} bursts",
+                where=self.files[i],
+                found=f"poses {self.trajectory.start_ns}..{self.trajectory.end_ns} ns",
+                wanted=f"{self.start_ns[i]}..{self.end_ns[i]} ns",
+            )
+        for front in (True, False):
+            again = np.flatnonzero(np.diff(np.sort(self.start_ns[self.of(front)])) == 0)
+            if len(again):
+                raise CardError("two bursts start at the same time", where=bursts, found=len(again), wanted=0)
+
+
+def _crop(points: npt.NDArray[np.float64], mode: str) -> npt.NDArray[np.bool_]:
+    """Points (N, 3) in the sensor frame that lie in the half-space that `mode` keeps."""
+    if mode == "none":
+        return np.ones(len(points), dtype=np.bool_)
+    forward: npt.NDArray[np.bool_] = points[:, 1] >= 0
+    return forward if mode == "forward" else ~forward

@@ -1,0 +1,46 @@
+import numpy as np
+import pytest
+
+from card.ground_truth.mad import mad_inliers
+
+
+def points_at_radii(radii: list[float]) -> np.ndarray:
+    # Pairs on opposite sides leave the mean at zero, so the radii are as given.
+    return np.array([[s * r, 0, 0] for r in radii for s in (1, -1)], dtype=np.float32)
+
+
+def test_both_forms_by_hand():
+    # radii 1 1 2 2 3 3 9 9: median 2.5, deviations 1.5 1.5 .5 .5 .5 .5 6.5 6.5, MAD (.5 + 1.5) / 2 = 1.
+    points = points_at_radii([1, 2, 3, 9])
+    voxel = np.zeros(8, dtype=np.int32)
+    deviation = mad_inliers(voxel, points, 1.5, "deviation", 2)
+    literal = mad_inliers(voxel, points, 1.5, "literal", 2)
+    assert deviation.tolist() == [True] * 6 + [False] * 2
+    assert literal.tolist() == [True] * 2 + [False] * 6
+
+
+def test_a_voxel_with_too_few_inliers_is_dropped():
+    points = points_at_radii([1, 2, 3, 9])
+    assert not mad_inliers(np.zeros(8, dtype=np.int32), points, 1.5, "literal", 3).any()
+    # One point is its own mean: r = 0 <= 0, a single inlier.
+    assert mad_inliers(np.zeros(1, np.int32), points[:1], 1.5, "deviation", 2).tolist() == [False]
+    assert mad_inliers(np.zeros(1, np.int32), points[:1], 1.5, "deviation", 1).tolist() == [True]
+
+
+@pytest.mark.parametrize("form", ["deviation", "literal"])
+@pytest.mark.parametrize("seed", range(4))
+def test_equals_a_loop_over_voxels(form, seed):
+    rng = np.random.default_rng(seed)
+    voxel = rng.integers(-5, 40, 600).astype(np.int32)
+    points = rng.uniform(0, 0.1, (600, 3)).astype(np.float32)
+    kept = mad_inliers(voxel, points, 1.5, form, 2)
+    for v in np.unique(voxel):
+        own = points[voxel == v].astype(np.float64)
+        radii = np.linalg.norm(own - own.mean(axis=0), axis=1)
+        mad = np.median(np.abs(radii - np.median(radii)))
+        inlier = (np.abs(radii - np.median(radii)) if form == "deviation" else radii) <= 1.5 * mad
+        assert kept[voxel == v].tolist() == (inlier & (inlier.sum() >= 2)).tolist()
+
+
+def test_no_points():
+    assert mad_inliers(np.zeros(0, np.int32), np.zeros((0, 3), np.float32), 1.5, "deviation", 2).shape == (0,)
