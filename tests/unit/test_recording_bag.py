@@ -207,7 +207,7 @@ def test_clouds_become_bursts(tmp_path: Path) -> None:
     burst = read_burst(path)
     assert burst.t_ns == STAMP_NS + 7
     assert burst.offset_ns.tolist() == [0, 43, 98_999_993]
-    np.testing.assert_allclose(burst.points, [[3, 3, 3], [1, 2, 3], [2, 2, 2]], atol=1e-9)
+    np.testing.assert_allclose(burst.points, [[3, 4, 5], [1, 2, 3], [2, 3, 4]], atol=1e-9)
 
 
 @pytest.mark.parametrize(("encoding", "channels"), [("rgb8", 3), ("bgr8", 3), ("mono8", 1)])
