@@ -36,6 +36,7 @@ rule release:
 
 
 onstart:
+    warn_lost_records()
     check_space()
 
 

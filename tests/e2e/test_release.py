@@ -28,8 +28,7 @@ def load(tree: Path, config: str, cache: Path) -> dict[str, int]:
     result = subprocess.run(
         [sys.executable, "-c", program, str(tree), config],
         env={**os.environ, "HF_HUB_OFFLINE": "1", "HF_HOME": str(cache)},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
+        capture_output=True,
         text=True,
         check=False,
     )

@@ -5,6 +5,7 @@ from card.artifacts.code import code_hash
 from card.artifacts.documents import read_yaml
 from card.artifacts.schemas import check, load_schema, with_defaults
 from card.errors import CardError
+from card.packaging.summary import summarize
 from card.recording.fingerprint import fingerprint
 from card.recording.sheet import read_sequences
 from card.recording.space import require_space
@@ -25,8 +26,14 @@ def load_plan():
     wanted = [name for name in str(SETTINGS["sequences"]).split(",") if name]
     unknown = sorted(set(wanted) - {row.id for row in rows})
     if unknown:
-        raise CardError("unknown sequence", where="--config sequences", found=unknown[0])
-    chosen = {row.id: row for row in rows if not row.quarantine and (not wanted or row.id in wanted)}
+        raise CardError(
+            "unknown sequence", where="--config sequences", found=unknown[0]
+        )
+    chosen = {
+        row.id: row
+        for row in rows
+        if not row.quarantine and (not wanted or row.id in wanted)
+    }
     for row in chosen.values():
         check_raw_input(row)
     return licenses, gates, chosen
@@ -35,13 +42,27 @@ def load_plan():
 def check_raw_input(row):
     """A recorded drive and its session must be there before anything starts."""
     simulated = SETTINGS["simulation"]
-    if row.id not in simulated["drives"] and not Path(row.recording, "recording.yaml").is_file():
-        raise CardError("recording is missing", where=row.id, wanted=f"{row.recording}/recording.yaml")
+    if (
+        row.id not in simulated["drives"]
+        and not Path(row.recording, "recording.yaml").is_file()
+    ):
+        raise CardError(
+            "recording is missing",
+            where=row.id,
+            wanted=f"{row.recording}/recording.yaml",
+        )
     if row.session and row.session not in simulated["sessions"]:
         folder = Path(RAW, "sessions")
         if not (folder / row.session).is_dir():
-            there = sorted(path.name for path in folder.glob("*")) + simulated["sessions"]
-            raise CardError("unknown session", where=row.id, found=row.session, wanted=f"one of {there}")
+            there = (
+                sorted(path.name for path in folder.glob("*")) + simulated["sessions"]
+            )
+            raise CardError(
+                "unknown session",
+                where=row.id,
+                found=row.session,
+                wanted=f"one of {there}",
+            )
 
 
 try:
@@ -66,7 +87,10 @@ def cfg(stage, *names):
     scale = SETTINGS["scale"]
     settings = {name: SETTINGS[stage][name] for name in names or SETTINGS[stage]}
     gates = [
-        {**{name: gate[name] for name in ("figure", "unit", "better")}, "threshold": gate["threshold"][scale]}
+        {
+            **{name: gate[name] for name in ("figure", "unit", "better")},
+            "threshold": gate["threshold"][scale],
+        }
         for gate in GATES
         if gate["stage"] == stage and scale in gate["threshold"]
     ]
@@ -90,27 +114,63 @@ def raw_folder(wildcards):
 def recording_folder(wildcards):
     """Folder in the raw layout: as recorded, or as converted from a bag."""
     sequence = SEQUENCES[wildcards.id]
-    return f"results/{sequence.id}/recording" if sequence.format == "rosbag2" else sequence.recording
+    return (
+        f"results/{sequence.id}/recording"
+        if sequence.format == "rosbag2"
+        else sequence.recording
+    )
 
 
 def raw_fingerprint(*names):
     """A param function: fingerprint of the named files and folders of a sequence's raw recording."""
 
     def of_sequence(wildcards):
-        folder, cache = Path(raw_folder(wildcards)), Path("results", wildcards.id, "fingerprints")
-        return {name: fingerprint(folder / name, cache / f"{name}.json") for name in names}
+        folder, cache = Path(raw_folder(wildcards)), Path(
+            "results", wildcards.id, "fingerprints"
+        )
+        return {
+            name: fingerprint(folder / name, cache / f"{name}.json") for name in names
+        }
 
     return of_sequence
 
 
 def check_space():
     """Stop before the start where the disk cannot hold what is still to be made."""
-    missing = [name for name in SIMULATED["drives"] if name in SEQUENCES and not Path(RAW, name).is_dir()]
-    folders = [Path(sequence.recording) for name, sequence in SEQUENCES.items() if not is_packed(name)]
+    missing = [
+        name
+        for name in SIMULATED["drives"]
+        if name in SEQUENCES and not Path(RAW, name).is_dir()
+    ]
+    folders = [
+        Path(sequence.recording)
+        for name, sequence in SEQUENCES.items()
+        if not is_packed(name)
+    ]
     try:
         require_space(Path("."), folders, len(missing), SETTINGS["scale"])
     except CardError as error:
         raise WorkflowError(f"card: {error}") from None
+
+
+def print_summary():
+    """What a run ends with: sequences, frames, files, bytes, gates, and where to look."""
+    print(summarize(Path("results", "release")))
+
+
+def print_failure():
+    print(
+        "card: not everything could be built; the lines that begin with 'card:' say why. Mend the input, or give the"
+        f" sequence a reason under quarantine in {SETTINGS['sheet']}, and run again: what is done is kept."
+    )
+
+
+def warn_lost_records():
+    """Without its records the workflow does not see changed settings; say so rather than keep stale results."""
+    if Path("results").is_dir() and not Path(".snakemake", "metadata").is_dir():
+        print(
+            "card: the records of earlier runs are gone: settings changed since then go unseen; --forceall rebuilds"
+        )
 
 
 def is_packed(name):

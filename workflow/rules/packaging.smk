@@ -1,6 +1,8 @@
 # Needs: every artifact of a sequence with its report, never a raw image; the release templates; the splits.
 # Makes: results/{id}/package/, one whole tree a licence under results/release/, and its validation.
-REPOSITORIES = {terms["repository"]: spdx for spdx, terms in LICENSES["licenses"].items()}
+REPOSITORIES = {
+    terms["repository"]: spdx for spdx, terms in LICENSES["licenses"].items()
+}
 TREE = "results/release/{repository}"
 
 
@@ -24,7 +26,9 @@ def stages_of(sequence):
 
 def package_inputs(wildcards):
     """Artifacts and reports by name, of the stages that this sequence goes through."""
-    stages = [stage for stage in stages_of(SEQUENCES[wildcards.id]) if stage != "splits"]
+    stages = [
+        stage for stage in stages_of(SEQUENCES[wildcards.id]) if stage != "splits"
+    ]
     found = {}
     for stage in stages:
         for name, path in getattr(rules, stage).output.items():
@@ -43,7 +47,16 @@ rule package:
     params:
         cfg=cfg("packaging", "shard_max_bytes", "classes"),
         code=code("package"),
-        row=row("id", "country", "place", "session", "road_type", "role", "off_road", "modalities"),
+        row=row(
+            "id",
+            "country",
+            "place",
+            "session",
+            "road_type",
+            "role",
+            "off_road",
+            "modalities",
+        ),
         spdx=lambda wildcards: license_of(SEQUENCES[wildcards.id]),
         recording=recording_folder,
         stages=lambda wildcards: stages_of(SEQUENCES[wildcards.id]),
@@ -58,11 +71,18 @@ def in_tree(repository):
 
 
 def tree_packages(wildcards):
-    return expand(rules.package.output.inventory, id=[sequence.id for sequence in in_tree(wildcards.repository)])
+    return expand(
+        rules.package.output.inventory,
+        id=[sequence.id for sequence in in_tree(wildcards.repository)],
+    )
 
 
 def tree_splits(wildcards):
-    chosen = [sequence.id for sequence in in_tree(wildcards.repository) if has(sequence, "camera_left")]
+    chosen = [
+        sequence.id
+        for sequence in in_tree(wildcards.repository)
+        if has(sequence, "camera_left")
+    ]
     return expand(rules.splits.output.splits, id=chosen)
 
 
@@ -70,7 +90,11 @@ rule assemble:
     input:
         packages=tree_packages,
         splits=tree_splits,
-        templates=[str(path) for path in sorted((BASE / "release").rglob("*")) if path.is_file()],
+        templates=[
+            str(path)
+            for path in sorted((BASE / "release").rglob("*"))
+            if path.is_file()
+        ],
     output:
         sums=f"{TREE}/SHA256SUMS",
         document=f"{TREE}/release.json",
@@ -82,7 +106,9 @@ rule assemble:
         code=code("assemble"),
         spdx=lambda wildcards: REPOSITORIES[wildcards.repository],
         terms=lambda wildcards: LICENSES["licenses"][REPOSITORIES[wildcards.repository]],
-        sequences=lambda wildcards: [sequence.id for sequence in in_tree(wildcards.repository)],
+        sequences=lambda wildcards: [
+            sequence.id for sequence in in_tree(wildcards.repository)
+        ],
         templates=str(BASE / "release"),
         out=subpath(output.sums, parent=True),
     script:
@@ -100,7 +126,9 @@ rule validate_tree:
         cfg=cfg("packaging"),
         code=code("validate_tree"),
         tree=subpath(input.sums, parent=True),
-        ledger=lambda wildcards: ledger_rows({sequence.id for sequence in in_tree(wildcards.repository)}),
+        ledger=lambda wildcards: ledger_rows(
+            {sequence.id for sequence in in_tree(wildcards.repository)}
+        ),
     script:
         "../scripts/validate_tree.py"
 

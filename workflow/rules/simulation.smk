@@ -1,6 +1,8 @@
 # Needs: nothing but a scale and a seed.
 # Makes: the embedded default input under recordings/, and its truth, which no other rule file names.
-SIMULATED = {name: SETTINGS["simulation"][name] for name in ("drives", "sessions", "surveys")}
+SIMULATED = {
+    name: SETTINGS["simulation"][name] for name in ("drives", "sessions", "surveys")
+}
 SEED = {"scale": SETTINGS["scale"], "seed": SETTINGS["simulation"]["seed"]}
 TRUTH = SETTINGS["simulation"]["truth"]
 
@@ -16,13 +18,13 @@ rule simulate_drive:
         trajectory=f"{RAW}/{{drive}}/trajectory.tum",
     log:
         "logs/simulation/{drive}.log",
+    wildcard_constraints:
+        drive=one_of(SIMULATED["drives"]),
     params:
         cfg=SEED,
         code=code("simulate_drive"),
         recording=subpath(output.recording, parent=True),
         truth=f"{TRUTH}/{{drive}}",
-    wildcard_constraints:
-        drive=one_of(SIMULATED["drives"]),
     script:
         "../scripts/simulate_drive.py"
 
@@ -33,13 +35,13 @@ rule simulate_session:
         ego_mask=f"{RAW}/sessions/{{simulated}}/ego_mask.png",
     log:
         "logs/simulation/{simulated}.log",
+    wildcard_constraints:
+        simulated=one_of(SIMULATED["sessions"]),
     params:
         cfg=SEED,
         code=code("simulate_session"),
         folder=subpath(output.bundle, parent=True),
         truth=f"{TRUTH}/sessions/{{simulated}}",
-    wildcard_constraints:
-        simulated=one_of(SIMULATED["sessions"]),
     script:
         "../scripts/simulate_session.py"
 
@@ -49,21 +51,27 @@ rule simulate_survey:
         board=f"{RAW}/sessions/{{day}}-leica/board.yaml",
     log:
         "logs/simulation/{day}-leica.log",
+    wildcard_constraints:
+        day=one_of(SIMULATED["surveys"]),
     params:
         cfg=SEED,
         code=code("simulate_survey"),
         folder=subpath(output.board, parent=True),
         truth=f"{TRUTH}/sessions/{{day}}-leica",
-    wildcard_constraints:
-        day=one_of(SIMULATED["surveys"]),
     script:
         "../scripts/simulate_survey.py"
 
 
 def simulated_days():
     """All that a drive day of the embedded input consists of, whether or not a stage reads it yet."""
-    days = {sequence.session.rsplit("-", 1)[0] for sequence in SEQUENCES.values() if sequence.session}
-    sessions = [name for name in SIMULATED["sessions"] if name.rsplit("-", 1)[0] in days]
+    days = {
+        sequence.session.rsplit("-", 1)[0]
+        for sequence in SEQUENCES.values()
+        if sequence.session
+    }
+    sessions = [
+        name for name in SIMULATED["sessions"] if name.rsplit("-", 1)[0] in days
+    ]
     surveys = [name for name in SIMULATED["surveys"] if name in days]
     return expand(rules.simulate_session.output.bundle, simulated=sessions) + expand(
         rules.simulate_survey.output.board, day=surveys

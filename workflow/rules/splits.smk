@@ -2,7 +2,10 @@
 # Makes: results/{id}/splits.parquet. The ledger itself grows only by the target assign_splits.
 from card.splits.ledger import COLUMNS, read_ledger
 
-LEDGER = [dict(zip(COLUMNS, line.cells())) for line in read_ledger(Path(SETTINGS["splits_ledger"]))]
+LEDGER = [
+    dict(zip(COLUMNS, line.cells()))
+    for line in read_ledger(Path(SETTINGS["splits_ledger"]))
+]
 
 
 def ledger_rows(names):
@@ -31,13 +34,19 @@ rule splits:
 rule assign_splits:
     # The committed ledger is not a result: this rule makes no file and runs whenever it is asked for.
     input:
-        frames=expand(rules.ingest.output.frames, id=ids(lambda s: has(s, "camera_left"))),
-        labels=expand(rules.annotations.output.labels, id=ids(lambda s: has(s, "camera_left"))),
+        frames=expand(
+            rules.ingest.output.frames, id=ids(lambda s: has(s, "camera_left"))
+        ),
+        labels=expand(
+            rules.annotations.output.labels, id=ids(lambda s: has(s, "camera_left"))
+        ),
     log:
         "logs/assign_splits.log",
     params:
         cfg=cfg("splits"),
         ledger=SETTINGS["splits_ledger"],
-        sequences=[SEQUENCES[name].as_dict() for name in ids(lambda s: has(s, "camera_left"))],
+        sequences=[
+            SEQUENCES[name].as_dict() for name in ids(lambda s: has(s, "camera_left"))
+        ],
     script:
         "../scripts/assign_splits.py"

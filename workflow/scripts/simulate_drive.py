@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from card.artifacts import logged
-from card.simulation.drive import simulate_drive
+from card.simulation.simulate import simulate_drive
 
 with logged(Path(snakemake.log[0])):
     simulate_drive(

@@ -1,0 +1,60 @@
+# Needs: validated trees; for each method a folder <repository>/<sequence>/<frame:06d>.npy of depth maps in metres.
+# Makes: results/benchmark/{method}/{repository}.json and .md.
+
+
+def predictions(wildcards):
+    return Path(
+        SETTINGS["benchmark"]["methods"][wildcards.method], wildcards.repository
+    )
+
+
+rule evaluate:
+    input:
+        sums=rules.assemble.output.sums,
+        validation=rules.validate_tree.output.validation,
+    output:
+        scores="results/benchmark/{method}/{repository}.json",
+        table="results/benchmark/{method}/{repository}.md",
+        report="results/benchmark/{method}/{repository}.report.json",
+    log:
+        "logs/benchmark/{method}/{repository}.log",
+    params:
+        cfg=cfg(
+            "benchmark", "profile", "min_depth_m", "max_depth_m", "height_thresholds_m"
+        ),
+        code=code("evaluate"),
+        raw=lambda wildcards: fingerprint(
+            predictions(wildcards),
+            Path(
+                "results",
+                "benchmark",
+                wildcards.method,
+                f"{wildcards.repository}.fingerprint.json",
+            ),
+        ),
+        tree=subpath(input.sums, parent=True),
+        split=SETTINGS["benchmark"]["split"],
+        predictions=lambda wildcards: str(predictions(wildcards)),
+    script:
+        "../scripts/evaluate.py"
+
+
+def evaluations(wildcards):
+    """One table a method and tree that the method has predictions for."""
+    methods = SETTINGS["benchmark"]["methods"]
+    tables = [
+        f"results/benchmark/{method}/{repository}.md"
+        for method, folder in methods.items()
+        for repository in REPOSITORIES
+        if in_tree(repository) and Path(folder, repository).is_dir()
+    ]
+    if not tables:
+        raise WorkflowError(
+            "card: no predictions to evaluate: name them in config.yaml under benchmark.methods"
+        )
+    return tables
+
+
+rule benchmark:
+    input:
+        evaluations,
