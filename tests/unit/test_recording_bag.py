@@ -170,6 +170,27 @@ def test_bad_bags_are_told(tmp_path: Path) -> None:
         run(root)
 
 
+@pytest.mark.parametrize("storage", ["sqlite3", "mcap"])
+def test_a_bag_that_is_cut_off_is_refused(tmp_path: Path, storage: str) -> None:
+    root = recording(tmp_path, storage=storage)
+    [data] = [path for path in (root / "bag").iterdir() if path.suffix in (".db3", ".mcap")]
+    whole = data.read_bytes()
+    for length in (0, 50, 4096, len(whole) // 2):
+        data.write_bytes(whole[:length])
+        with pytest.raises(CardError, match="raw/bag: unreadable bag"):
+            run(root)
+
+
+def test_a_bag_with_fewer_messages_than_it_says_is_refused(tmp_path: Path) -> None:
+    root = recording(tmp_path)
+    metadata = root / "bag" / "metadata.yaml"
+    text = metadata.read_text()
+    assert text.count("message_count: 5") == 1
+    metadata.write_text(text.replace("message_count: 5", "message_count: 6"))
+    with pytest.raises(CardError, match=r"/left: bag is not whole .found 5 messages, wanted 6"):
+        run(root)
+
+
 def test_two_images_of_one_time_are_refused(tmp_path: Path) -> None:
     root = tmp_path / "raw"
     root.mkdir()

@@ -34,19 +34,28 @@ class Source:
     _connections: tuple[Any, ...]
 
     def messages(self) -> Iterator[tuple[Any, int]]:
-        """Messages with the time at which the host recorded them, ns, in that order."""
+        """Messages with the time at which the host recorded them, ns, in that order.
+
+        Raises CardError for a message that cannot be read, or when there are fewer or more of them
+        than the bag says.
+        """
         store = typestore()
-        for index, (_, host_ns, raw) in enumerate(self._reader.messages(connections=self._connections)):
+        stream = self._reader.messages(connections=self._connections)
+        read = 0
+        while True:
             try:
-                yield store.deserialize_cdr(raw, self.kind), host_ns
-            # rosbags lets whatever a broken message trips over through.
-            except (ValueError, IndexError, AssertionError, UnicodeDecodeError) as error:
-                raise CardError(
-                    "unreadable message",
-                    where=f"{self.where}, message {index}",
-                    found=error,
-                    wanted=self.kind,
-                ) from error
+                _, host_ns, raw = next(stream)
+                message = store.deserialize_cdr(raw, self.kind)
+            except StopIteration:
+                break
+            # The storage plugins let the errors of the libraries under them through.
+            except Exception as error:
+                where = f"{self.where}, message {read}"
+                raise CardError("unreadable message", where=where, found=error, wanted=self.kind) from error
+            read += 1
+            yield message, host_ns
+        if read != self.count:
+            raise CardError("bag is not whole", where=self.where, found=f"{read} messages", wanted=self.count)
 
 
 @contextmanager
