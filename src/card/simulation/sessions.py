@@ -12,7 +12,7 @@ from card.geometry import CameraModel, from_json, to_json
 from card.recording.laz import write_burst
 from card.simulation.board_images import BoardCameras, write_board_yaml
 from card.simulation.board_scene import board_quads, place_board, surroundings
-from card.simulation.board_sweep import TURN_NS, sweep
+from card.simulation.board_sweep import sweep
 from card.simulation.calibrations import (
     delivered_calibration,
     session_rig,
@@ -20,6 +20,7 @@ from card.simulation.calibrations import (
     true_calibration,
 )
 from card.simulation.ego import ego_pixels
+from card.simulation.lidar import PERIOD_NS
 from card.simulation.scales import scale_named
 
 VIEWS = {"tiny": 3, "demo": 12, "full": 500}
@@ -28,7 +29,7 @@ VIEWS = {"tiny": 3, "demo": 12, "full": 500}
 _TILT_DEG = 16.0
 _VIEW_NS = 2_000_000_000
 # An image lies inside its sweep: the board stands still for longer than a turn.
-_SWEEP_LEAD_NS = TURN_NS // 2
+_SWEEP_LEAD_NS = PERIOD_NS // 2
 
 
 def simulate_session(session: str, *, folder: Path, truth: Path, scale: str, seed: int) -> None:
@@ -51,19 +52,20 @@ def simulate_session(session: str, *, folder: Path, truth: Path, scale: str, see
             shown = board_quads(rig_from_board)
             t_ns = session_start_ns(session) + number * _VIEW_NS
             cameras.photograph(partial, shown, t_ns, rng)
-            burst = sweep(rig, [*behind, *shown], size.columns, t_ns - _SWEEP_LEAD_NS, rng)
+            start_ns = t_ns - _SWEEP_LEAD_NS
+            burst = sweep(rig, [*behind, *shown], size.columns, number, start_ns, rng)
             write_burst(partial / "lidar_front" / f"{burst.t_ns}.laz", burst)
             views.append({"folder": ".", "t_ns": t_ns, "rig_from_board": to_json(rig_from_board)})
         calibration = delivered_calibration(session, seed, scale, views=VIEWS[scale])
         write_json(partial / "calibration.json", calibration, "calibration")
-        cv2.imwrite(str(partial / "ego_mask.png"), ego_mask(calibration))
+        cv2.imwrite(str(partial / "ego_mask.png"), delivered_mask(calibration))
     with atomic_folder(truth) as partial:
         write_json(partial / "calibration.json", true_calibration(session, seed, scale), "calibration")
         poses = {"schema": "board_poses", "views": views, "stations": []}
         write_json(partial / "board_poses.json", poses, "board_poses")
 
 
-def ego_mask(calibration: dict[str, Any]) -> NDArray[np.uint8]:
+def delivered_mask(calibration: dict[str, Any]) -> NDArray[np.uint8]:
     """The mask (height, width) uint8 of the undistorted left image: 255 on the car and a rim around it."""
     camera = CameraModel.from_json(calibration["camera_left_undistorted"])
     body = ego_pixels(camera, from_json(calibration["extrinsics"]["rig_from_camera_left"]))
