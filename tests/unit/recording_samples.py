@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from card.artifacts import write_table
+from card.artifacts import default_settings, write_table
 from card.recording.burst import Burst
 from card.recording.description import write_description
+from card.recording.ingest import ingest
 from card.recording.laz import write_burst
 from card.recording.paths import CAMERAS, LIDARS, SENSORS, burst_path, image_path, imu_path
 
@@ -86,3 +87,20 @@ def write_recording(root: Path, sensors: tuple[str, ...] = SENSORS) -> Path:
         span = imu_columns(START_NS - 50_000_000, START_NS + (FRAMES + 1) * PERIOD_NS)
         write_table(imu_path(root), span, "imu")
     return root
+
+
+def ingest_sample(root: Path, sensors: tuple[str, ...] = SENSORS, gates: Any = (), **row: Any) -> Path:
+    """Ingest the recording `root` of `write_recording`; the folder of its tables, beside it."""
+    out = root.parent / "results"
+    ingest(
+        recording=root,
+        sequence=sheet_row(sensors) | row,
+        ledger=root.parent / "ledger" / "sample.tsv",
+        frames=out / "frames.parquet",
+        bursts=out / "bursts.parquet",
+        inventory=out / "inventory.parquet",
+        report=out / "ingest.report.json",
+        settings=default_settings("ingest"),
+        gates=gates,
+    )
+    return out

@@ -185,9 +185,9 @@ def test_a_bag_with_fewer_messages_than_it_says_is_refused(tmp_path: Path) -> No
     root = recording(tmp_path)
     metadata = root / "bag" / "metadata.yaml"
     text = metadata.read_text()
-    assert text.count("message_count: 5") == 1
+    assert "message_count: 5" in text, "packets and images"
     metadata.write_text(text.replace("message_count: 5", "message_count: 6"))
-    with pytest.raises(CardError, match=r"/left: bag is not whole .found 5 messages, wanted 6"):
+    with pytest.raises(CardError, match=r"bag is not whole .found 5 messages, wanted 6"):
         run(root)
 
 
