@@ -1,34 +1,27 @@
 """Ingest of small recordings: sound ones, and everything that can be wrong with one."""
 
 import json
-import shutil
-from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import yaml
-from recording_samples import ingest_sample, (
+from recording_samples import (
     FRAMES,
     PERIOD_NS,
     START_NS,
-    burst,
-    imu_columns,
+    ingest_sample,
     jpeg,
-    sheet_row,
     write_recording,
 )
 
-from card.artifacts import default_settings, inventory, read_table, write_table
+from card.artifacts import inventory, read_table
 from card.errors import CardError
-from card.recording.burst import Burst
-from card.recording.ingest import ingest
 from card.recording.ingest.bursts import BurstTimes
 from card.recording.ingest.frames import key_bursts, pair_right
 from card.recording.ingest.ledger import number_frames
-from card.recording.laz import write_burst
-from card.recording.paths import SENSORS, burst_path, image_path, imu_path
+from card.recording.paths import image_path
+
 
 @pytest.fixture
 def root(tmp_path: Path) -> Path:
