@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from schema_rows import columns
 
-from card.artifacts import check, default_settings, load_schema, read_json, write_json, write_table
+from card.artifacts import check, default_settings, read_json, write_json, write_table
 from card.benchmark import evaluate
 from card.errors import CardError
 from card.geometry import CameraModel, quaternion_from_matrix, rasterize
@@ -25,18 +26,6 @@ def cloud(frame: int) -> np.ndarray:
     rng = np.random.default_rng(frame)
     pixels = rng.uniform(0, 139, (3000, 2))
     return (CAMERA.rays(pixels) * rng.uniform(3, 40, (3000, 1))).astype(np.float32)
-
-
-def columns(schema: str, rows: list[dict[str, Any]], blank: dict[str, Any]) -> dict[str, list[Any]]:
-    return {name: [(blank | row)[name] for row in rows] for name in load_schema(schema)["columns"]}
-
-
-def blank_frame() -> dict[str, Any]:
-    blank: dict[str, Any] = {}
-    for name, field in load_schema("release_frames")["columns"].items():
-        plain = {"string": "x", "bool": False}.get(field["type"], 0)
-        blank[name] = None if field.get("nullable") else field.get("enum", [plain])[0]
-    return blank
 
 
 @pytest.fixture(scope="module")
@@ -69,13 +58,13 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
                     "spdx": "CC-BY-4.0",
                 }
             )
-    write_table(tree / "metadata/members.parquet", columns("release_members", rows, {}), "release_members")
+    write_table(tree / "metadata/members.parquet", columns("release_members", rows), "release_members")
     frames = [
         {"sequence": SEQUENCE, "frame": frame, "has_ground_truth": frame != 6, "split": "test"}
         for frame in FRAMES
     ]
     for split in ("train", "validation", "test", "zero_shot", "unassigned"):
-        table = columns("release_frames", frames if split == "test" else [], blank_frame())
+        table = columns("release_frames", frames if split == "test" else [])
         write_table(tree / f"metadata/frames-{split}.parquet", table, "release_frames")
     write_json(tree / "sequences" / SEQUENCE / "calibration.json", CALIBRATION, "calibration")
     plane = {
@@ -87,11 +76,11 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "z": 1.0,
         **dict(zip(("qw", "qx", "qy", "qz"), quaternion_from_matrix(np.eye(3)), strict=True)),
     }
-    rest = dict.fromkeys(("normal_x", "normal_y", "residual_m", "x", "y"), 0.0)
+    plane |= dict.fromkeys(("normal_x", "normal_y", "residual_m", "x", "y"), 0.0)
     planes = [plane, plane | {"frame": 3, "t_ns": 1, "valid": False}]
     write_table(
         tree / "sequences" / SEQUENCE / "road_planes.parquet",
-        columns("road_planes", planes, rest),
+        columns("road_planes", planes),
         "road_planes",
     )
     release = {
