@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from card.errors import CardError
 from card.recording.bag.bursts import PacketCount, packet_bursts, packets_of
+from card.recording.bag.clocks import relate_clock
 from card.recording.bag.source import open_bag
 from card.recording.hesai.angles import nominal_angles, read_channel_angles, write_channel_angles
 from card.recording.hesai.decode import Columns, columns_of, points_of
@@ -221,7 +222,11 @@ def test_the_real_recording_equals_its_reference(test_data: Path) -> None:
     with open_bag(bag, {"lidar_front": "/pandar_packets"}) as [source]:
         bursts = list(packet_bursts(source, angles, COLUMN_PERIOD_NS, None, count))
         chunks = [packets_of(message, "test")[0] for message, _ in source.messages()]
+        clock = relate_clock(source)
     assert (count.packets, count.lost) == (2000, 0)
+    # The sensor's clock runs freely in 2019, the host's stamps are of 2023.
+    assert clock.offset_ns / 1e9 == pytest.approx(1_673_400_677 - 1_564_024_769, abs=1.0)
+    assert 0 < clock.delay_ns < 1e6
     assert len(bursts) == 3
     scans = list(whole_scans(columns_of(chunk, COLUMN_PERIOD_NS, "test") for chunk in chunks))
     assert np.count_nonzero(scans[-1].distance) == 121_648

@@ -1,4 +1,4 @@
-"""Ingest of small recordings: sound ones, and everything that can be wrong with one."""
+"""Ingest of small recordings that are sound: tables, numbers of frames, pairs."""
 
 import json
 from pathlib import Path
