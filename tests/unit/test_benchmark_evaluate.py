@@ -114,6 +114,7 @@ def run(tree: Path, predictions: Path, split: str = "test") -> dict[str, Any]:
     evaluate(
         release=tree,
         split=split,
+        method=predictions.name,
         predictions=predictions,
         out=out,
         table=out.with_suffix(".md"),

@@ -9,6 +9,7 @@ with logged(Path(snakemake.log[0])):
     evaluate(
         release=Path(snakemake.params.tree),
         split=snakemake.params.split,
+        method=snakemake.wildcards.method,
         predictions=Path(snakemake.params.predictions),
         out=Path(snakemake.output.scores),
         table=Path(snakemake.output.table),

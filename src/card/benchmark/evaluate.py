@@ -21,6 +21,7 @@ def evaluate(
     *,
     release: Path,
     split: str,
+    method: str,
     predictions: Path,
     out: Path,
     table: Path,
@@ -32,7 +33,7 @@ def evaluate(
 
     Parameters
     ----------
-    release : tree of a release; split : one of its splits.
+    release : tree of a release; split : one of its splits. method : what its results are called.
     predictions : folder of ``<sequence>/<frame:06d>.npy``: depth (H, W) in metres, floats, original image
         space, 0 or NaN where there is none. One a frame that has ground truth; none of other splits.
     out : document `evaluation`; table : the same as Markdown.
@@ -61,7 +62,7 @@ def evaluate(
     once = [score for score in scores if score.scaling == "none"]
     document = {
         "schema": "evaluation",
-        "method": predictions.resolve().name,
+        "method": method,
         "repository": about["repository"],
         "version": about["version"],
         "split": split,
