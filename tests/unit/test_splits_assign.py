@@ -68,9 +68,9 @@ def run(
 
 def test_every_third_frame_takes_the_split_of_its_row(tmp_path: Path) -> None:
     table = run(tmp_path, [ledger_row(0, "4", "train"), ledger_row(5, "-", "test")])
-    assert table["split"] == [
-        "train", "unassigned", "unassigned", "train", "unassigned", "unassigned", "test", "unassigned", "unassigned",
-    ]  # fmt: skip
+    sampled = [split for frame, split in enumerate(table["split"]) if frame in (0, 3, 6)]
+    assert sampled == ["train", "train", "test"]
+    assert table["split"].count("unassigned") == 6
     assert table["sampled"] == [frame % 3 == 0 for frame in range(9)]
     assert set(table["group"]) == {"g"}
 

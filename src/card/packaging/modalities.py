@@ -75,7 +75,7 @@ def burst_entries(
         if row["lidar"] != lidar:
             continue
         path = folder / Path(row["file"]).name
-        source = Source(member_name(sequence, row["burst"], lidar), path, hashes.get(f"{lidar}/{path.name}"))
+        source = Source(member_name(sequence, row["burst"], lidar), path, hashes[f"{lidar}/{path.name}"])
         entries.append(Entry(source, None, row["burst"]))
     return entries
 

@@ -3,6 +3,7 @@
 import hashlib
 import io
 import tarfile
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -22,10 +23,8 @@ def check_members(contents: Contents) -> Iterator[str]:
         number = row["frame"] if row["burst"] is None else row["burst"]
         if number is None or row["file"] != member_name(row["sequence"], number, row["modality"]):
             yield f"metadata/members.parquet: {row['file']} is misnamed for its frame, burst or modality"
-    names = [row["file"] for row in contents.members]
-    for name in sorted(
-        {name for name in names if names.count(name) > 1} if len(set(names)) < len(names) else ()
-    ):
+    counts = Counter(row["file"] for row in contents.members)
+    for name in sorted(name for name, count in counts.items() if count > 1):
         yield f"metadata/members.parquet: {name} is listed twice"
     for shard, rows in sorted(by_shard.items()):
         path = contents.tree / shard
