@@ -68,9 +68,7 @@ def sweep(lidar: str, t_ns: int, trajectory: Trajectory, columns: int, boxes: li
     hit = np.isfinite(distance)
     noise = np.random.default_rng(t_ns).normal(0, 0.005, hit.sum())
     points = directions[hit] * (distance[hit] + noise)[:, None]
-    return Burst(
-        t_ns, points, np.full(hit.sum(), 40, np.uint8), ring[hit].astype(np.uint8), offset[hit]
-    )
+    return Burst(t_ns, points, np.full(hit.sum(), 40, np.uint8), ring[hit].astype(np.uint8), offset[hit])
 
 
 def write_drive(
@@ -150,7 +148,7 @@ def calibration() -> dict:
         "cameras": {"camera_left": camera, "camera_right": camera},
         "camera_left_undistorted": pinhole,
         "extrinsics": extrinsics,
-        "wheels": {name: wheel for name in ("fl", "fr", "rl", "rr")},
+        "wheels": dict.fromkeys(("fl", "fr", "rl", "rr"), wheel),
         "lidar_corrections": {"lidar_front": NO_CORRECTION, "lidar_rear": NO_CORRECTION},
         "covariances": {},
         "quality": {"stereo_reprojection_px": 0.1, "board_plane_rms_m": 0.001, "views": 10},

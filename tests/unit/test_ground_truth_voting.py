@@ -45,14 +45,14 @@ def spread(views: list[int], origins: np.ndarray) -> float:
 def test_greedy_gate_equals_a_loop(seed, far):
     rng = np.random.default_rng(seed)
     origins = np.cumsum(rng.normal(0, 0.03, (40, 3)), axis=0)
-    pairs = sorted({(int(v), int(b)) for v, b in zip(rng.integers(0, 30, 400), rng.integers(0, 40, 400))})
+    pairs = sorted({(int(v), int(b)) for v, b in rng.integers(0, (30, 40), (400, 2))})
     voxel, burst = np.array(pairs).T
     views = distinct_views(voxel, burst, origins, 31, 0.05, 4, far)
     for v in range(31):
         wanted = greedy([b for w, b in pairs if w == v], origins, 0.05)
         if views.settled[v]:
             assert len(wanted) >= views.count[v] >= 4
-            assert spread(wanted, origins) >= views.baseline[v] >= far
+            assert spread(wanted, origins) + 1e-12 >= views.baseline[v] >= far
         else:
             assert views.count[v] == len(wanted)
             assert views.baseline[v] == pytest.approx(spread(wanted, origins), abs=1e-12)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from card.geometry import apply
 from card.ground_truth.sweeps import Drive
 from card.ground_truth.voxel_map import VoxelMap
 from card.ground_truth.voxels import find
@@ -78,7 +79,9 @@ def flow_residuals(
         max_correspondence_distance=settings["flow_max_correspondence_m"],
         num_threads=1,
     )
-    aligned = source @ result.T_target_source[:3, :3].T + result.T_target_source[:3, 3]
+    # A registration that wanders off would contradict everything: the poses are then the better guess.
+    target_from_source = result.T_target_source if result.converged else np.eye(4)
+    aligned = apply(target_from_source, source)
     distances, _ = cKDTree(aligned).query(target)
     return np.asarray(distances, dtype=np.float64)
 

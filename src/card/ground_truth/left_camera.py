@@ -54,13 +54,14 @@ class LeftCamera:
         return inside
 
     def on_ego(self, points: Points) -> Mask:
-        """Points (N, 3), z > 0, whose undistorted projection falls on the car's own body."""
-        pixels = self.undistorted.project(points)
-        inside = self.undistorted.contains(pixels)
-        column, row = np.rint(pixels[inside]).astype(np.int64).T
-        result = np.zeros(len(points), dtype=np.bool_)
-        result[inside] = self._ego[row, column]
-        return result
+        """Points (N, 3), z > 0, whose undistorted projection falls on the car's own body.
+
+        The original image sees a little beyond the undistorted one: there the mask's edge goes on.
+        """
+        column, row = np.rint(self.undistorted.project(points)).T
+        column = np.clip(column, 0, self.undistorted.width - 1).astype(np.int64)
+        row = np.clip(row, 0, self.undistorted.height - 1).astype(np.int64)
+        return self._ego[row, column]
 
     def raster(self, points: Points) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
         """Indices of the points (N, 3) on the original image, by row, column and depth; their pixels (K, 2).

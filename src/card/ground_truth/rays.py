@@ -10,11 +10,11 @@ import numpy.typing as npt
 Floats = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
 
-#: Poses a sweep is divided into; between two of them the sensor moves less than a millimetre a m/s.
+#: Poses a sweep is divided into.
 POSES = 256
 _AZIMUTH_BINS = 2048
-#: What the division may shift a direction by: 5 mm of origin and 0.5 mrad of heading. Exact tests follow.
-_PAD_M, _PAD_RAD = 5e-3, 5e-4
+#: Rounds after which the search for the pose that saw a place gives up; a place beside the car takes most.
+_ROUNDS = 10
 #: Rays this close to the cut at +-pi are listed on both sides of it.
 _WRAP_RAD = 0.3
 #: Azimuths of one ring, those listed twice included, lie within this much of one another.
@@ -44,7 +44,8 @@ class SweepRays:
     Parameters
     ----------
     points : (N, 3) returns in world, metres. time_ns, ring : (N,) firing times and channels.
-    pose_ns : (M,) evenly spaced times over the sweep. poses : (M, 4, 4) world_from_lidar at them.
+    pose_ns : (M,) evenly spaced times over the sweep, about one turn of the head.
+    poses : (M, 4, 4) world_from_lidar at them.
     """
 
     def __init__(
@@ -56,6 +57,10 @@ class SweepRays:
         poses: Floats,
     ) -> None:
         self._rotations, self._translations = poses[:, :3, :3], poses[:, :3, 3]
+        # Metres and radians the sensor moves at most from one pose to the next, and a radian of its spin.
+        self._step_m = np.linalg.norm(np.diff(self._translations, axis=0), axis=1).max()
+        self._step_rad = np.linalg.norm(np.diff(self._rotations, axis=0), axis=(1, 2)).max() / np.sqrt(2)
+        self._poses_a_rad = (len(pose_ns) - 1) / (2 * np.pi)
         at = (time_ns - pose_ns[0]) / max(int(pose_ns[-1] - pose_ns[0]), 1) * (len(pose_ns) - 1)
         low = np.minimum(at.astype(np.int64), len(pose_ns) - 2)
         share = (at - low)[:, None]
@@ -108,20 +113,18 @@ class SweepRays:
         self, places: Floats, lateral: float, nearest: float, furthest: float
     ) -> tuple[Index, Index]:
         """Pairs (place, ray) that hold all within `lateral`; the exact test is the caller's."""
-        middle = self._translations[len(self._translations) // 2]
-        kept = np.arange(len(places))
-        # The sensor moves during the sweep: settle at which of its poses it looked at each place.
-        fired = (places - middle) @ self._rotations[len(self._rotations) // 2]
-        for _ in range(2):
-            pose = self._pose_at[_azimuth_bin(np.arctan2(fired[:, 0], fired[:, 1]))]
-            fired = np.einsum("nji,nj->ni", self._rotations[pose], places - self._translations[pose])
+        fired = self._seen_by_sensor(places)
         flat = np.hypot(fired[:, 0], fired[:, 1])
         distance = np.hypot(flat, fired[:, 2])
-        half = np.arcsin(np.minimum((lateral + _PAD_M) / np.maximum(distance, 1e-9), 1.0)) + _PAD_RAD
         elevation = np.arctan2(fired[:, 2], flat)
-        reach = lateral + _PAD_M
+        reach = lateral + 2 * self._step_m + 1e-4
+        half = np.arcsin(np.minimum(reach / np.maximum(distance, 1e-9), 1.0)) + 2 * self._step_rad + 1e-4
+        # Within the window the sensor moves on, which widens the window: close by, when driving fast.
+        drift = self._poses_a_rad * (self._step_m / np.maximum(distance, 1e-9) + self._step_rad)
+        half /= np.maximum(1 - drift, 0.1)
         near = (distance >= nearest - reach) & (distance <= furthest + reach) & (half < _WRAP_RAD)
-        kept, half, elevation, fired = kept[near], half[near], elevation[near], fired[near]
+        kept = np.flatnonzero(near)
+        half, elevation, fired = half[near], elevation[near], fired[near]
         azimuth = np.arctan2(fired[:, 0], fired[:, 1])
         # A window of angle h reaches asin(sin h / cos e) to the sides at elevation e.
         cosine = np.cos(np.abs(elevation) + half)
@@ -135,6 +138,23 @@ class SweepRays:
             places_.append(np.repeat(kept[row], counts))
             rays.append(self._ray[_ranges(first, counts)])
         return np.concatenate(places_), np.concatenate(rays)
+
+    def _seen_by_sensor(self, places: Floats) -> Floats:
+        """Places (P, 3) in the frame of the moving sensor at the time at which it looked at them."""
+        pose = np.full(len(places), len(self._rotations) // 2)
+        fired = np.empty_like(places)
+        open_ = np.arange(len(places))
+        for _ in range(_ROUNDS):
+            at = pose[open_]
+            fired[open_] = np.einsum(
+                "nji,nj->ni", self._rotations[at], places[open_] - self._translations[at]
+            )
+            azimuth = np.arctan2(fired[open_, 0], fired[open_, 1])
+            pose[open_] = self._pose_at[_azimuth_bin(azimuth)]
+            open_ = open_[np.abs(pose[open_] - at) > 1]
+            if not len(open_):
+                break
+        return fired
 
 
 def _azimuth_bin(azimuth: Floats) -> Index:

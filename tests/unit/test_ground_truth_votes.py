@@ -1,0 +1,178 @@
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from card.artifacts import default_settings
+from card.geometry import Trajectory
+from card.ground_truth.icp_flow import FlowVotes, dynamic_by_flow, flow_residuals, flow_votes, scan_pairs
+from card.ground_truth.surface import local_planes
+from card.ground_truth.sweeps import Sweep
+from card.ground_truth.visibility_votes import (
+    Votes,
+    dynamic_by_visibility,
+    evidence_sweeps,
+    visibility_votes,
+)
+from card.ground_truth.voxel_map import build_voxel_map
+from card.ground_truth.voxels import VoxelGrid, find, unpack
+
+SETTINGS = default_settings("ground_truth")
+GRID = VoxelGrid.around(Trajectory([0, 1], np.zeros((2, 3)), [[1, 0, 0, 0]] * 2), 0.1)
+
+
+class StandingDrive:
+    """Sweeps of a sensor that stands still while it turns; each has its own place."""
+
+    def __init__(self, clouds: list[np.ndarray], origins: np.ndarray, front: np.ndarray) -> None:
+        self.clouds, self.origins, self.front = clouds, origins, front
+        self.start_ns = np.arange(len(clouds)) * 100_000_000
+        self.end_ns = self.start_ns + 99_000_000
+
+    def of(self, front: bool) -> np.ndarray:
+        return np.flatnonzero(self.front == front)
+
+    def poses(self, i: int, t_ns: np.ndarray) -> np.ndarray:
+        poses = np.tile(np.eye(4), (len(t_ns), 1, 1))
+        poses[:, :3, 3] = self.origins[i]
+        return poses
+
+    def sweep(self, i: int) -> Sweep:
+        points = self.clouds[i]
+        away = points - self.origins[i]
+        turn = np.arctan2(away[:, 0], away[:, 1]) % (2 * np.pi) / (2 * np.pi)
+        times = self.start_ns[i] + (turn * 99_000_000).astype(np.int64)
+        return Sweep(points, times, np.zeros(len(points), np.uint8), 0, 0)
+
+    def map(self):
+        bursts = [(i, bool(self.front[i]), cloud) for i, cloud in enumerate(self.clouds)]
+        return build_voxel_map(bursts, self.origins, GRID, SETTINGS)
+
+
+def random_drive(seed: int, sweeps: int = 5) -> StandingDrive:
+    rng = np.random.default_rng(seed)
+    origins = np.stack([rng.normal(0, 0.5, sweeps), np.arange(sweeps), np.full(sweeps, 1.5)], axis=1)
+    clouds = []
+    for i in range(sweeps):
+        away = rng.normal(0, 1, (700, 3))
+        away[:, 2] = -np.abs(away[:, 2]) * 0.3 - 0.15
+        away /= np.linalg.norm(away, axis=1, keepdims=True)
+        ground = origins[i] + away * (-1.5 / away[:, 2:])
+        blob = rng.normal(0, 0.3, (150, 3)) + np.array([2, 3, 0.5])
+        clouds.append(np.concatenate([ground[np.linalg.norm(ground, axis=1) < 12], blob]))
+    return StandingDrive(clouds, origins, np.arange(sweeps) % 2 == 0)
+
+
+def brute_votes(drive, voxels, chosen, surface) -> np.ndarray:
+    votes = np.zeros((3, len(chosen)), dtype=int)
+    for i, cloud in enumerate(drive.clouds):
+        occupied = np.unique(GRID.indices(cloud), axis=0)
+        lengths = np.linalg.norm(cloud - drive.origins[i], axis=1)
+        d = (cloud - drive.origins[i]) / lengths[:, None]
+        for k, v in enumerate(chosen):
+            index = unpack(voxels.keys[v : v + 1])[0]
+            c = GRID.corners(voxels.keys[v : v + 1])[0] + voxels.centroids[v]
+            reach = np.abs(occupied - index).max(axis=1)
+            if (reach == 0).any():
+                votes[0, k] += 1
+                continue
+            t = (c - drive.origins[i]) @ d.T
+            aside = np.linalg.norm(c - drive.origins[i] - t[:, None] * d, axis=1)
+            passing = (aside <= 0.06) & (t >= 1) & (t <= 50) & (lengths - t >= 0.1)
+            if not passing.any():
+                continue
+            if (reach <= 2).any():
+                votes[1, k] += 1
+                continue
+            n = surface.normals[k]
+            clear = (np.abs((cloud - c) @ n) > 0.1) & (np.abs(d @ n) > 0.12)
+            votes[2, k] += bool((passing & (lengths - t >= 0.3) & (clear | ~surface.planar[k])).any())
+    return votes
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_votes_equal_a_search_over_all_rays_and_voxels(seed):
+    drive = random_drive(seed)
+    voxels = drive.map()
+    chosen = np.sort(np.random.default_rng(seed).choice(len(voxels.keys), 500, replace=False))
+    votes = visibility_votes(drive, range(5), voxels, chosen, SETTINGS)
+    wanted = brute_votes(drive, voxels, chosen, local_planes(voxels, chosen, SETTINGS))
+    assert votes.hits.tolist() == wanted[0].tolist()
+    assert votes.beside.tolist() == wanted[1].tolist()
+    assert votes.moved.tolist() == wanted[2].tolist()
+    assert wanted.sum(axis=1).min() >= 3
+
+
+def test_planes_equal_a_loop_over_neighbours():
+    voxels = random_drive(3).map()
+    chosen = np.arange(0, len(voxels.keys), 7)
+    surface = local_planes(voxels, chosen, SETTINGS)
+    indices = unpack(voxels.keys)
+    means = GRID.corners(voxels.keys) + voxels.centroids
+    for k, v in enumerate(chosen):
+        near = means[np.abs(indices - indices[v]).max(axis=1) <= 2]
+        variance, axes = np.linalg.eigh(np.cov(near.T, bias=True) if len(near) > 1 else np.zeros((3, 3)))
+        s = np.sqrt(np.maximum(variance, 0))
+        margin = min(abs(s[0] - 0.035), abs(s[1] - 2.5 * s[0]))
+        if len(near) >= 6 and margin > 1e-6:
+            assert surface.planar[k] == (s[0] < 0.035 and s[1] > 2.5 * s[0])
+        if surface.planar[k]:
+            assert len(near) >= 6
+            assert abs(surface.normals[k] @ axes[:, 0]) == pytest.approx(1, abs=1e-4)
+    assert 10 < surface.planar.sum() < len(chosen)
+
+
+def test_evidence_sweeps_keep_their_distance_and_thin_a_lidar_at_a_time():
+    origins = np.stack([np.arange(12) * 0.3, np.zeros(12), np.zeros(12)], axis=1)
+    drive = SimpleNamespace(origins=origins, front=np.arange(12) % 2 == 0)
+    drive.of = lambda front: np.flatnonzero(drive.front == front)
+    assert evidence_sweeps(drive, 0.5, 1) == list(range(12))
+    assert evidence_sweeps(drive, 1.19, 1) == [0, 1, 4, 5, 8, 9]
+    assert evidence_sweeps(drive, 1.19, 2) == [0, 1, 8, 9]
+
+
+def test_dynamic_by_visibility_allows_more_where_quotas_are_met():
+    votes = Votes(*(np.array(v, dtype=np.int32) for v in ([3, 3, 0, 9], [1, 1, 0, 0], [2, 2, 1, 2])))
+    assert votes.comparisons.tolist() == [6, 6, 1, 11]
+    met = np.array([True, False, False, False])
+    assert dynamic_by_visibility(votes, met, SETTINGS).tolist() == [False, True, False, False]
+
+
+def test_pairs_of_one_lidar_by_distance_and_time():
+    origins = np.stack([np.arange(20) * 0.1, np.zeros(20), np.zeros(20)], axis=1)
+    drive = StandingDrive([np.zeros((0, 3))] * 20, origins, np.arange(20) % 2 == 0)
+    pairs = scan_pairs(drive, 0.5, 0.8)
+    # 0.5 m are five bursts, 0.8 s are eight: the first of the same LiDAR.
+    assert pairs[:3] == [(0, 8), (2, 10), (4, 12)]
+    assert all(j - i == 8 for i, j in pairs)
+
+
+def test_residuals_survive_a_pose_error_but_show_what_moved():
+    rng = np.random.default_rng(0)
+    ground = np.stack([*rng.uniform(-6, 6, (2, 4000)), rng.normal(0, 0.005, 4000)], axis=1)
+    wall = np.stack([np.full(2500, 5.0), rng.uniform(-6, 6, 2500), rng.uniform(0, 3, 2500)], axis=1)
+    front = np.stack([rng.uniform(-6, 6, 2500), np.full(2500, 6.0), rng.uniform(0, 3, 2500)], axis=1)
+    box = rng.uniform(-0.3, 0.3, (300, 3)) + np.array([0, 0, 1])
+    origin = np.array([1e5, -2e5, 30.0])
+    first = np.concatenate([ground, wall, front, box]) + origin
+    second = np.concatenate([ground, wall, front, box + np.array([1.5, 0, 0])]) + origin + (0.15, 0.12, 0.0)
+    residuals = flow_residuals(first, second, origin, SETTINGS)
+    assert np.median(residuals[:-300]) < 0.03
+    assert (residuals[-300:] > 0.1).all()
+
+
+def test_flow_votes_count_a_voxel_once_a_pair():
+    cloud = np.random.default_rng(1).uniform(-3, 3, (3000, 3)) * (1, 1, 0.01)
+    origins = np.arange(8)[:, None] * np.array([[0.2, 0, 0]])
+    drive = StandingDrive([cloud] * 8, origins, np.ones(8, bool))
+    voxels = drive.map()
+    votes = flow_votes(drive, voxels, SETTINGS)
+    assert len(scan_pairs(drive, 0.5, 0.5)) == 3
+    assert (votes.comparisons == 3).all()
+    assert not votes.moved.any()
+    assert (find(voxels.keys, GRID.keys(cloud)) >= 0).all()
+
+
+def test_dynamic_by_flow_wants_votes_and_share():
+    votes = FlowVotes(np.array([1, 2, 7, 6]), np.array([1, 2, 10, 10]))
+    assert dynamic_by_flow(votes, SETTINGS).tolist() == [False, True, True, False]
