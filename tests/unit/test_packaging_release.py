@@ -61,6 +61,8 @@ import json, sys
 from datasets import get_dataset_config_names, load_dataset
 for tree in sys.argv[1:]:
     rows = {name: load_dataset(tree, name).num_rows for name in get_dataset_config_names(tree)}
+    if "mini" in rows:
+        rows["picture"] = load_dataset(tree, "mini", split="full")[0]["image"].size
     print(json.dumps(rows | {"default": list(load_dataset(tree))}))
 """
 
@@ -171,6 +173,7 @@ def test_trees_load_with_datasets_with_images_and_without(tree: Path, tmp_path: 
     files = 4 + 5 * FRAMES
     assert found[0]["frames"] == {"train": 2, "unassigned": 4}
     assert (found[0]["members"], found[0]["mini"]) == ({"full": files}, {"full": 2})
+    assert found[0]["picture"] == [32, 24]
     assert found[0]["default"] == ["train", "unassigned"]
     assert found[1] == {"sequences": {"full": 1}, "members": {"full": 2 * FRAMES}, "default": ["full"]}
 

@@ -13,7 +13,7 @@ def mini_columns(release: Release, frames: Rows, per_sequence: int, side_px: int
 
     Thumbnails are made from the packed left images, which are anonymized.
     """
-    names = ("sequence", "frame", "split", "width", "height", "jpeg", "spdx")
+    names = ("sequence", "frame", "split", "width", "height", "image", "spdx")
     columns: dict[str, list[Any]] = {name: [] for name in names}
     by_sequence: dict[str, list[Any]] = {}
     for row in sorted(frames, key=lambda row: (row["sequence"], row["frame"])):

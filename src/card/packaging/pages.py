@@ -7,6 +7,7 @@ from typing import Any
 
 import yaml
 
+from card.artifacts import load_schema
 from card.errors import CardError
 
 SPLITS = ("train", "validation", "test", "zero_shot", "unassigned")
@@ -105,8 +106,17 @@ def front_matter(release: Mapping[str, Any], title: str, has_mini: bool) -> dict
         "task_categories": ["depth-estimation", "object-detection"],
         "tags": ["autonomous-driving", "road-topography", "lidar", "stereo"],
         "size_categories": [next((name for limit, name in SIZES if frames < limit), "n>1M")],
+        "dataset_info": [{"config_name": "mini", "features": _features("release_mini")}] if has_mini else [],
         "configs": configs,
     }
+
+
+def _features(schema: str) -> list[dict[str, str]]:
+    """Features of a table for `datasets`, which shows what is binary here as pictures."""
+    return [
+        {"name": name, "dtype": "image" if field["type"] == "binary" else field["type"]}
+        for name, field in load_schema(schema)["columns"].items()
+    ]
 
 
 def _counts(release: Mapping[str, Any], sequences: Sequence[Mapping[str, Any]]) -> str:
