@@ -32,7 +32,7 @@ class BurstTruth:
     """
 
     dynamic: NDArray[np.bool_]
-    range_m: Array
+    range_m: NDArray[np.float32]
     surface: NDArray[np.uint8]
 
 
@@ -102,7 +102,7 @@ class Lidar:
             offset[back].astype(np.uint32),
         )
         dynamic = triangle >= self._tracer.static_triangles
-        return burst, BurstTruth(dynamic, hits.distance[back], surface)
+        return burst, BurstTruth(dynamic, hits.distance[back].astype(np.float32), surface)
 
     def _distance(self, true: Array, ring: NDArray[np.int64]) -> Array:
         """Ranges (N,) as reported: biased, noisy and quantised; inf stays."""

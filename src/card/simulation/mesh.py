@@ -34,10 +34,6 @@ class Mesh:
         """The mesh in frame ``a`` given ``a_from_mesh`` (4, 4)."""
         return replace(self, vertices=apply(pose, self.vertices))
 
-    def radius(self) -> float:
-        """Distance of the farthest vertex from the frame's origin, m."""
-        return float(np.linalg.norm(self.vertices, axis=1).max())
-
 
 def mesh(
     vertices: ArrayLike,

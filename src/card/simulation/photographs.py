@@ -22,8 +22,7 @@ _UNREVIEWED_EVERY = 7
 
 def write_photographs(world: World, tracer: Tracer, ego: Scene, recording: Path, truth: Path) -> None:
     """Images of both cameras, ``annotations/``, ``privacy_labels.csv``, and the truth's ``boxes.parquet``."""
-    static = Scene(world.static)
-    shader = Shader(tracer, static, world.things, world.drive.section, world.sun)
+    shader = Shader(tracer, world.things, world.drive.section, world.sun)
     first = world.start_ns + round(world.scale.camera_start_s * 1e9)
     times = [first + k * _FRAME_NS for k in range(round(world.scale.camera_duration_s * 10))]
     found: list[tuple[str, int, Box]] = []

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from card.artifacts.open3d import import_open3d
 from card.geometry import Trajectory
+from card.simulation.gallery import Gallery
 from card.simulation.mesh import Mesh, join
 
 Array = NDArray[np.float64]
@@ -15,7 +16,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Mover:
-    """A rigid body and its path: ``world_from_body`` over the whole drive."""
+    """A rigid body and its path ``world_from_body``; all movers of a world share their paths' times."""
 
     mesh: Mesh
     path: Trajectory
@@ -25,8 +26,8 @@ class Mover:
 class Hits:
     """What rays met.
 
-    distance : (N,) m, inf for nothing.  triangle : (N,) int64 into `Tracer.all`, -1 for nothing.
-    barycentric : (N, 2) weights of the triangle's second and third corner.  normal : (N, 3) in world.
+    distance : (N,) m, inf for nothing.  triangle : (N,) int64 into the mesh, -1 for nothing.
+    barycentric : (N, 2) weights of the triangle's second and third corner.  normal : (N, 3), unit.
     """
 
     distance: Array
@@ -58,72 +59,43 @@ class Scene:
             found["primitive_normals"].numpy(),
         )
 
+    def blocked(self, origins: ArrayLike, directions: ArrayLike) -> NDArray[np.bool_]:
+        """Whether rays (N, 3) meet anything (N,)."""
+        rays = np.concatenate(np.broadcast_arrays(origins, directions), axis=1).astype(np.float32)
+        return np.asarray(self._scene.test_occlusions(self._tensor(rays), nthreads=1).numpy())
+
 
 class Tracer:
     """The static world and all movers.
 
-    all : every body's mesh in one, static first, for looking up attributes of the triangle that was hit.
+    all : every body's mesh in one, static first, to look up what was hit.  static : the static scene.
     """
 
     def __init__(self, static: Mesh, movers: Sequence[Mover]) -> None:
         self.all = join([static, *(m.mesh for m in movers)])
-        self._static = Scene(static)
-        self._movers = [(m, Scene(m.mesh), m.mesh.radius()) for m in movers]
-        counts = [len(static.triangles), *(len(m.mesh.triangles) for m in movers)]
-        self._first = np.cumsum([0, *counts])
+        self.static = Scene(static)
         self.static_triangles = len(static.triangles)
+        self._movers = Gallery([m.mesh for m in movers], [m.path for m in movers]) if movers else None
 
     def cast(self, origins: Array, directions: Array, t_ns: NDArray[np.int64]) -> Hits:
         """First hits of rays (N, 3) in world, directions of unit length, fired at times t_ns (N,)."""
-        hits = self._static.cast(origins, directions)
-        centre = origins.mean(axis=0)
-        spread = float(np.linalg.norm(origins - centre, axis=1).max())
-        for index, (mover, scene, radius) in enumerate(self._movers):
-            ends = mover.path.at(np.array([t_ns.min(), t_ns.max()]))[:, :3, 3]
-            reach = radius + spread + float(np.linalg.norm(ends[1] - ends[0]))
-            chosen = _towards(ends.mean(axis=0) - centre, reach, directions)
-            if len(chosen):
-                self._cast_mover(
-                    mover, scene, int(self._first[index + 1]), origins, directions, t_ns, chosen, hits
-                )
+        hits = self.static.cast(origins, directions)
+        if self._movers is None:
+            return hits
+        found = self._movers.cast(origins, directions, t_ns)
+        # Far to near, so that the nearest mover is written last.
+        order = np.argsort(-found.distance, kind="stable")
+        order = order[found.distance[order] < hits.distance[found.ray[order]]]
+        ray = found.ray[order]
+        hits.distance[ray] = found.distance[order]
+        hits.triangle[ray] = found.triangle[order] + self.static_triangles
+        hits.barycentric[ray] = found.barycentric[order]
+        hits.normal[ray] = found.normal[order]
         return hits
 
     def uv(self, hits: Hits, chosen: NDArray[np.intp]) -> NDArray[np.float32]:
         """Texture coordinates (K, 2) of the chosen hits."""
         corners = self.all.uv[self.all.triangles[hits.triangle[chosen]]]
-        b = hits.barycentric[chosen]
-        weights = np.stack([1 - b[:, 0] - b[:, 1], b[:, 0], b[:, 1]], axis=1)
-        return np.asarray(np.einsum("kc,kcx->kx", weights, corners))
-
-    def _cast_mover(
-        self,
-        mover: Mover,
-        scene: Scene,
-        first: int,
-        origins: Array,
-        directions: Array,
-        t_ns: NDArray[np.int64],
-        chosen: NDArray[np.intp],
-        hits: Hits,
-    ) -> None:
-        times, inverse = np.unique(t_ns[chosen], return_inverse=True)
-        pose = mover.path.at(times)[inverse]
-        rotation, position = pose[:, :3, :3], pose[:, :3, 3]
-        local = scene.cast(
-            np.einsum("kij,ki->kj", rotation, origins[chosen] - position),
-            np.einsum("kij,ki->kj", rotation, directions[chosen]),
-        )
-        nearer = local.distance < hits.distance[chosen]
-        winners = chosen[nearer]
-        hits.distance[winners] = local.distance[nearer]
-        hits.triangle[winners] = local.triangle[nearer] + first
-        hits.barycentric[winners] = local.barycentric[nearer]
-        hits.normal[winners] = np.einsum("kij,kj->ki", rotation[nearer], local.normal[nearer])
-
-
-def _towards(offset: Array, reach: float, directions: Array) -> NDArray[np.intp]:
-    """Indices of the directions (N, 3) that may meet a sphere of radius ``reach`` at ``offset`` (3,)."""
-    distance = float(np.linalg.norm(offset))
-    if distance <= reach:
-        return np.arange(len(directions))
-    return np.flatnonzero(directions @ offset >= np.sqrt(distance**2 - reach**2))
+        b = hits.barycentric[chosen, :, None]
+        first = corners[:, 0]
+        return np.asarray(first + b[:, 0] * (corners[:, 1] - first) + b[:, 1] * (corners[:, 2] - first))

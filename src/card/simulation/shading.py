@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from card.simulation.raycast import Hits, Scene, Tracer
+from card.simulation.raycast import Hits, Tracer
 from card.simulation.road import CrossSection
 from card.simulation.surfaces import LOOKS, Surface
 from card.simulation.traffic import Thing
@@ -31,17 +31,15 @@ _EXPOSURE = 1.5
 class Shader:
     """Colours of hits in one world."""
 
-    def __init__(
-        self, tracer: Tracer, static: Scene, things: Sequence[Thing], section: CrossSection, sun: Array
-    ) -> None:
-        self._tracer, self._static, self._things = tracer, static, things
+    def __init__(self, tracer: Tracer, things: Sequence[Thing], section: CrossSection, sun: Array) -> None:
+        self._tracer, self._things = tracer, things
         self._section, self._sun = section, sun.astype(np.float32)
         rng = np.random.default_rng(0)
         white = rng.normal(size=(_NOISE_SIZE, _NOISE_SIZE)).astype(np.float32)
         self._noise = np.clip(white / 2, -1, 1)
 
     def colours(self, hits: Hits, origins: Array, directions: Array, focal_px: float) -> Image:
-        """Linear RGB (N, 3) of rays (N, 3), sky where nothing was met; ``focal_px`` decides what is too fine."""
+        """Linear RGB (N, 3) of rays (N, 3), sky where nothing was met; ``focal_px`` fades the too fine."""
         out = sky(directions, self._sun)
         met = np.flatnonzero(hits.triangle >= 0)
         if not len(met):
@@ -112,8 +110,8 @@ class Shader:
         pieces = [
             cv2.remap(
                 shown,
-                np.float32(piece[:, :1] * width - 0.5),
-                np.float32(piece[:, 1:] * height - 0.5),
+                (piece[:, :1] * width - 0.5).astype(np.float32),
+                (piece[:, 1:] * height - 0.5).astype(np.float32),
                 cv2.INTER_LINEAR,
                 borderMode=cv2.BORDER_REPLICATE,
             )
@@ -126,7 +124,7 @@ class Shader:
         self, origins: Array, directions: Array, distance: Array, normal: Image, lit: NDArray[np.bool_]
     ) -> NDArray[np.bool_]:
         points = origins[lit] + directions[lit] * distance[lit, None] + 0.02 * normal[lit]
-        return np.isinf(self._static.cast(points, self._sun.astype(np.float64)[None]).distance)
+        return ~self._tracer.static.blocked(points, self._sun[None])
 
 
 def sky(directions: Array, sun: Array | Image) -> Image:

@@ -1,5 +1,7 @@
 """One drive from nothing to files: the raw recording as a car would leave it, and the truth beside it."""
 
+import shutil
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,13 +12,13 @@ from card.geometry import Trajectory
 from card.recording.laz import write_burst
 from card.recording.paths import burst_path, imu_path
 from card.simulation.bodies import ego_body
+from card.simulation.deliveries import as_bag, write_trajectory
 from card.simulation.footprint import wheel_contacts
 from card.simulation.imu import ImuErrors, imu_times, measured_imu
 from card.simulation.lidar import Lidar, burst_starts
 from card.simulation.photographs import write_photographs
 from card.simulation.raycast import Scene, Tracer
-from card.simulation.rig import LIDARS, WHEELS
-from card.simulation.trajectory_delivery import write_trajectory
+from card.simulation.rig import CAMERAS, LIDARS, WHEELS
 from card.simulation.world import World, build_world
 
 
@@ -36,17 +38,20 @@ def simulate_drive(drive: str, *, recording: Path, truth: Path, scale: str, seed
     """
     world = build_world(drive, scale, seed)
     with atomic_folder(truth) as truth_part, atomic_folder(recording) as recording_part:
-        native = recording_part
-        path = _write_motion(world, native, truth_part)
+        native = recording_part / "native" if world.drive.bag else recording_part
+        path = write_motion(world, native, truth_part)
         tracer, ego = Tracer(world.static, world.movers), Scene(ego_body())
         for lidar in LIDARS:
-            _write_bursts(world, tracer, ego, lidar, native, truth_part)
+            write_bursts(world, tracer, ego, lidar, native, truth_part)
         write_photographs(world, tracer, ego, native, truth_part)
-        _write_description(world, native)
-        write_trajectory(recording_part, path, seed=seed)
+        write_description(world, native)
+        if world.drive.bag:
+            as_bag(native, recording_part)
+            shutil.rmtree(native)
+        write_trajectory(recording_part, path, seed)
 
 
-def _write_motion(world: World, recording: Path, truth: Path) -> Trajectory:
+def write_motion(world: World, recording: Path, truth: Path) -> Trajectory:
     """IMU table, true trajectory, wheels and mesh; the true trajectory at IMU rate is returned."""
     times = imu_times(world.start_ns, world.scale.duration_s)
     write_table(imu_path(recording), measured_imu(world.path, times, ImuErrors(), world.rng("imu")), "imu")
@@ -71,7 +76,8 @@ def _write_motion(world: World, recording: Path, truth: Path) -> Trajectory:
     return path
 
 
-def _write_bursts(world: World, tracer: Tracer, ego: Scene, lidar: str, recording: Path, truth: Path) -> None:
+def write_bursts(world: World, tracer: Tracer, ego: Scene, lidar: str, recording: Path, truth: Path) -> None:
+    """All sweeps of one LiDAR, and for each what its points really met."""
     sensor = Lidar(world, tracer, ego, lidar)
     (recording / lidar).mkdir(parents=True)
     starts = burst_starts(lidar, world.start_ns, world.scale.duration_s)
@@ -82,7 +88,8 @@ def _write_bursts(world: World, tracer: Tracer, ego: Scene, lidar: str, recordin
         write_arrays(truth / "bursts" / lidar / f"{t_ns}.npz", arrays, "truth_burst")
 
 
-def _write_description(world: World, recording: Path) -> None:
+def write_description(world: World, recording: Path, cameras: Sequence[str] = CAMERAS) -> None:
+    """recording.yaml of a drive with both LiDARs, the IMU and these cameras."""
     clock = {"clock": "synchronised"}
     period = 100_000_000 // world.scale.columns
     lidar = {"model": "PandarXT-32", **clock, "deskewed": False, "column_period_ns": period}
@@ -94,10 +101,9 @@ def _write_description(world: World, recording: Path) -> None:
         "place": world.drive.place,
         "country": world.drive.country,
         "sensors": {
-            "camera_left": camera,
-            "camera_right": camera,
-            "lidar_front": lidar,
-            "lidar_rear": lidar,
+            # A dict of its own for each: YAML would tie shared ones together with anchors.
+            **{name: dict(camera) for name in cameras},
+            **{name: dict(lidar) for name in LIDARS},
             "imu": {"model": "simulated MEMS, 200 Hz", **clock},
         },
     }

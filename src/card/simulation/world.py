@@ -58,7 +58,11 @@ class World:
 
 def build_world(name: str, scale: str, seed: int) -> World:
     """The world of one demo drive at one scale; any seed makes a new one."""
-    drive, size = drive_named(name), scale_named(scale)
+    return world_of(name, drive_named(name), scale_named(scale), seed)
+
+
+def world_of(name: str, drive: Drive, size: Scale, seed: int) -> World:
+    """The world of any drive, at a scale that may have a duration of its own."""
     day_ns = int(np.datetime64(drive.day, "ns").astype(np.int64))
     start_ns = day_ns + round(drive.starts * 3600) * 1_000_000_000
     begin = size.camera_start_s
@@ -91,7 +95,7 @@ def build_world(name: str, scale: str, seed: int) -> World:
     sun = np.array(
         [np.cos(elevation) * np.sin(azimuth), np.cos(elevation) * np.cos(azimuth), np.sin(elevation)]
     )
-    rig = session_rig(drive.session, seed, scale)
+    rig = session_rig(drive.session, seed, size.name)
     return World(
         name, drive, size, seed, rig, start_ns, road, where, path, static, traffic.movers, things, sun
     )
@@ -106,7 +110,7 @@ def _line(drive: Drive, where: Course, rng: np.random.Generator) -> CentreLine:
 def _irregularities(
     drive: Drive, line: CentreLine, camera_s: float, rng: np.random.Generator
 ) -> tuple[Irregularity, ...]:
-    """Bumps and potholes all along; the cameras' excerpt always starts before one of each kind the drive has."""
+    """Bumps and potholes all along; the cameras' excerpt always starts before one of each kind there is."""
     edge = drive.section.half_width
     first, last = line.start + 4, line.start + line.length - 4
     found: list[Irregularity] = []
