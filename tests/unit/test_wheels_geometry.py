@@ -173,8 +173,10 @@ def test_a_dive_while_standing_leaves_the_road_where_it_is() -> None:
     along = np.concatenate([np.linspace(0, 10, 200), np.full(200, 10.0)])
     dive = np.concatenate([np.zeros(200), 0.02 * np.sin(np.arange(200) / 10)])
     path = contact_path(trajectory(along, heave=dive), CONTACT, STEP_M)
-    arc = np.linspace(0, 10, 1000)
-    found = fit_excitation(path, arc, np.full(arc.size, 0.01), spline(), GapSettings(0.2, 3))
+    y = np.linspace(1, 11, 1000)
+    points = np.stack([np.full_like(y, -0.8), y, np.full_like(y, 0.01)], axis=1)
+    arc, height = corridor_samples(points, path, (-1, 20), Corridor(0.12, 0.35))
+    found = fit_excitation(path, arc, height, spline(), GapSettings(0.2, 3))
     np.testing.assert_allclose(found.position[10:, 2], 0.01, atol=1e-5)
 
 

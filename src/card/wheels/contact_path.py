@@ -10,6 +10,8 @@ from card.geometry import Trajectory, apply, matrix_from_quaternion, transform
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
+#: A contact that goes back less than this is that of a body nodding over standing wheels.
+MIN_RUN_M = 0.3
 
 
 @dataclass(frozen=True)
@@ -21,6 +23,7 @@ class ContactPath:
     knots : (M,) indices of the poses that are at least one step apart; a standing car adds none.
     knot_arc : (M,) cumulative length d_i of the polyline through them, metres.
     arc : (N,) arc length of every pose, by projection on that polyline.
+    segment : (N,) number of the segment each pose lies on; segment i joins knots i and i + 1.
     run : (M - 1,) number of the run each segment belongs to: it grows where driving turns to reverse or back.
     """
 
@@ -30,6 +33,7 @@ class ContactPath:
     knots: Indices
     knot_arc: Array
     arc: Array
+    segment: Indices
     run: Indices
 
     @property
@@ -47,6 +51,10 @@ class ContactPath:
         # Differences first: nanoseconds since 1970 do not fit a float64.
         since = np.asarray(t_ns, dtype=np.int64) - self.t_ns[0]
         return np.interp(since, self.t_ns - self.t_ns[0], self.arc)
+
+    def elevation(self, arc: ArrayLike) -> Array:
+        """World z (...) in metres of the path itself at arc lengths (...)."""
+        return np.interp(np.asarray(arc), self.knot_arc, self.knot_position[:, 2])
 
     def surface(self, arc: ArrayLike, height: ArrayLike) -> Array:
         """Points (..., 3) in world at arc lengths (...) and heights (...) over the path, both metres.
@@ -76,9 +84,11 @@ def contact_path(trajectory: Trajectory, contact_rig: ArrayLike, min_step_m: flo
     lengths = np.linalg.norm(steps, axis=1)
     knot_arc = np.concatenate([[0.0], np.cumsum(lengths)])
     forward = np.einsum("ij,ij->i", steps, rotation[knots[:-1], :, 1]) >= 0
-    run = np.concatenate([[0], np.cumsum(forward[1:] != forward[:-1])])[: len(steps)].astype(np.int64)
-    arc = _arc(position, knots, knot_arc)
-    return ContactPath(trajectory.t_ns, position, rotation, knots, knot_arc, arc, run)
+    run = _runs(forward, lengths)
+    segment = np.searchsorted(knots, np.arange(len(position)), side="right") - 1
+    segment = np.clip(segment, 0, max(len(knots) - 2, 0))
+    arc = _arc(position, knots, knot_arc, segment)
+    return ContactPath(trajectory.t_ns, position, rotation, knots, knot_arc, arc, segment, run)
 
 
 def _knots(position: Array, min_step_m: float) -> Indices:
@@ -88,16 +98,30 @@ def _knots(position: Array, min_step_m: float) -> Indices:
         if math.dist(point, last) >= min_step_m:
             kept.append(i)
             last = point
+    # The rest after the last knot is shorter than a step: the last segment takes it in.
+    if len(kept) > 1 and math.dist(points[-1], points[kept[-2]]) >= min_step_m:
+        kept[-1] = len(points) - 1
     return np.array(kept, dtype=np.int64)
 
 
-def _arc(position: Array, knots: Indices, knot_arc: Array) -> Array:
+def _arc(position: Array, knots: Indices, knot_arc: Array, segment: Indices) -> Array:
     if len(knots) == 1:
         return np.zeros(len(position))
-    segment = np.clip(np.searchsorted(knots, np.arange(len(position)), side="right"), 1, len(knots) - 1)
-    start = position[knots[segment - 1]]
-    step = position[knots[segment]] - start
+    start = position[knots[segment]]
+    step = position[knots[segment + 1]] - start
     alpha = np.einsum("ij,ij->i", step, position - start) / np.einsum("ij,ij->i", step, step)
-    # What is left after the last knot is shorter than a step and goes on along the last segment.
-    limit = np.where(np.arange(len(position)) > knots[-1], 2.0, 1.0)
-    return knot_arc[segment - 1] + np.clip(alpha, 0.0, limit) * (knot_arc[segment] - knot_arc[segment - 1])
+    return knot_arc[segment] + np.clip(alpha, 0.0, 1.0) * (knot_arc[segment + 1] - knot_arc[segment])
+
+
+def _runs(forward: NDArray[np.bool_], lengths: Array) -> Indices:
+    """Run numbers (S,) of segments: a new one wherever the direction changes for long enough."""
+    if len(forward) == 0:
+        return np.zeros(0, dtype=np.int64)
+    starts = np.concatenate([[0], np.flatnonzero(forward[1:] != forward[:-1]) + 1])
+    long_enough = np.add.reduceat(lengths, starts) >= MIN_RUN_M
+    direction, turns = None, []
+    for start in starts[long_enough].tolist():
+        if direction is not None and forward[start] != direction:
+            turns.append(start)
+        direction = forward[start]
+    return np.searchsorted(turns, np.arange(len(forward)), side="right").astype(np.int64)

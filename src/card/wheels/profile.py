@@ -1,4 +1,4 @@
-"""The road's height along a path: a robust smoothing spline."""
+"""The road's elevation along a path: a robust smoothing spline."""
 
 from dataclasses import dataclass
 
@@ -56,30 +56,36 @@ def tukey_weights(residual: Array, scale: float) -> Array:
     return np.maximum(0.0, 1 - np.square(residual / scale)) ** 2
 
 
-def fit_profile(arc: Array, height: Array, settings: SplineSettings) -> tuple[Profile, Array]:
+def fit_profile(
+    arc: Array, height: Array, settings: SplineSettings, guess: Array | None = None
+) -> tuple[Profile, Array]:
     """The spline through points (N,), N >= 1, and the Tukey weight (N,) each point ends with.
+
+    `guess` (N,) is about how high the road is at each point, metres; 0 if not given.
 
     Minimises the sum of Tukey's loss over the heights plus the penalty times the squared second differences
     of the coefficients, by reweighted least squares (supplement, "Wheel Excitation"). The loss is annealed
     from wide to narrow, because from a bad start the narrow one locks on to an outlier cluster, and the
     spline is stiffer while the loss is wide, so that a cluster is outvoted by the road before and behind it.
     """
-    start, spacing = float(arc.min()), settings.knot_spacing_m
-    count = int(np.ceil((float(arc.max()) - start) / spacing)) + 3 if arc.max() > start else 4
+    spacing = settings.knot_spacing_m
+    # One interval more at each end, where the penalty alone continues the spline.
+    start = float(arc.min()) - spacing
+    count = int(np.ceil((float(arc.max()) - start) / spacing)) + 4
     first, basis = uniform_basis(arc, start, spacing, count)
     coefficients = np.zeros(count)
     scale = settings.tukey_start_m
+    fitted = np.zeros(len(arc)) if guess is None else guess
     for _ in range(MAX_ITERATIONS):
-        weights = tukey_weights(height - _evaluate(first, basis, coefficients), scale)
+        weights = tukey_weights(height - fitted, scale)
         stiffness = (scale / settings.tukey_m) ** settings.penalty_anneal_power
         solution = _solve(first, basis, height, weights, _penalty_band(count, settings.penalty * stiffness))
         step = float(np.abs(solution - coefficients).max())
-        coefficients = solution
+        coefficients, fitted = solution, _evaluate(first, basis, solution)
         if scale == settings.tukey_m and step < CONVERGED_M:
             break
         scale = max(scale * settings.anneal_factor, settings.tukey_m)
-    profile = Profile(start, spacing, coefficients)
-    return profile, tukey_weights(height - _evaluate(first, basis, coefficients), settings.tukey_m)
+    return Profile(start, spacing, coefficients), tukey_weights(height - fitted, settings.tukey_m)
 
 
 def _evaluate(first: NDArray[np.int64], basis: Array, coefficients: Array) -> Array:

@@ -47,36 +47,53 @@ def fit_excitation(
 ) -> Excitation:
     """The excitation of one wheel from the arc lengths and heights (Q,) of its corridor points, metres.
 
-    Beyond the first and last accepted point the profile keeps its last height; without any point the rigid
-    path itself comes back. Both are gaps.
+    Each run of the path has a spline of its own. It is fitted to the points' elevation, which is their
+    height h_p plus that of the path at d_p, rather than to h_p: the road is smooth in arc length, but over a
+    body that dives to a stop h_p jumps. A knot's spacing beyond the accepted points of a run the height over
+    the path stays as it is; a run without points keeps the rigid path. Both are gaps.
     """
-    if len(arc) == 0:
-        none = np.zeros(len(path.t_ns), dtype=np.int64)
-        return Excitation(path.t_ns, path.position, none, np.full(len(none), np.nan), none == 0)
-    profile, weight = fit_profile(arc, height, spline)
+    lift = np.zeros(len(path.t_ns))
+    points = np.zeros(len(path.t_ns), dtype=np.int64)
+    residual = np.full(len(path.t_ns), np.nan)
+    for run in np.unique(path.run):
+        segments = np.flatnonzero(path.run == run)
+        samples = (path.segment >= segments[0]) & (path.segment <= segments[-1])
+        inside = (arc >= path.knot_arc[segments[0]]) & (arc <= path.knot_arc[segments[-1] + 1])
+        if inside.any():
+            lift[samples], points[samples], residual[samples] = _fit_run(
+                path, path.arc[samples], arc[inside], height[inside], spline, gaps.reach_m
+            )
+    position = _on_the_road(path, lift)
+    return Excitation(path.t_ns, position, points, residual, points < gaps.min_points)
+
+
+def _fit_run(
+    path: ContactPath, at: Array, arc: Array, height: Array, spline: SplineSettings, reach_m: float
+) -> tuple[Array, NDArray[np.int64], Array]:
+    """Height over the path, accepted points near and their residual at arc lengths (S,) of a run, from its
+    points (Q,)."""
+    order = np.argsort(arc, kind="stable")
+    arc, height = arc[order], height[order]
+    base = path.elevation(arc)
+    profile, weight = fit_profile(arc, height + base, spline, guess=base)
     accepted = weight > 0
-    order = np.argsort(arc[accepted], kind="stable")
-    arc, height, weight = (values[accepted][order] for values in (arc, height, weight))
-    points, residual = _quality(path.arc, arc, height - profile.at(arc), weight, gaps.reach_m)
-    nearest = np.clip(path.arc, arc[0], arc[-1]) if len(arc) else path.arc
-    return Excitation(
-        path.t_ns,
-        _on_the_road(path, profile.at(nearest)),
-        points,
-        residual,
-        points < gaps.min_points,
-    )
+    if not accepted.any():
+        return np.zeros(len(at)), np.zeros(len(at), dtype=np.int64), np.full(len(at), np.nan)
+    arc, weight, error = arc[accepted], weight[accepted], (height + base - profile.at(arc))[accepted]
+    points, residual = _quality(at, arc, error, weight, reach_m)
+    nearest = np.clip(at, arc[0] - spline.knot_spacing_m, arc[-1] + spline.knot_spacing_m)
+    return profile.at(nearest) - path.elevation(nearest), points, residual
 
 
 def _on_the_road(path: ContactPath, height: Array) -> Array:
-    """Contact points (N, 3): each pose's own, raised along the rig's z to the surface at its arc length.
+    """Contact points (N, 3): each pose's own, slid along the rig's z to the elevation of its arc length.
 
-    The surface is fixed to the world, so a body that dives or rolls while the car stands moves its contact
-    path but not the result.
+    That elevation is fixed to the world, so a body that dives or rolls while the car stands moves its
+    contact path but not the result.
     """
     up = path.rotation[:, :, 2]
-    lift = np.einsum("ij,ij->i", up, path.surface(path.arc, height) - path.position)
-    return path.position + lift[:, None] * up
+    rise = path.surface(path.arc, height)[:, 2] - path.position[:, 2]
+    return path.position + (rise / up[:, 2])[:, None] * up
 
 
 def _quality(
