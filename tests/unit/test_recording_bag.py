@@ -82,10 +82,6 @@ def run(root: Path) -> Path:
 @pytest.mark.parametrize("storage", ["sqlite3", "mcap"])
 def test_a_bag_becomes_a_recording(tmp_path: Path, storage: str) -> None:
     root = recording(tmp_path, storage=storage)
-    (root / "annotations" / "labels").mkdir(parents=True)
-    (root / "annotations" / "labels" / "1.txt").write_text("0 0.5 0.5 0.1 0.1\n")
-    (root / "trajectory.tum").write_text("# t x y z qx qy qz qw\n")
-    (root / "privacy_labels.csv").write_text("camera,t_ns\n")
     out = run(root)
 
     bursts = [read_burst(path) for path in list_bursts(out, "lidar_front")]
@@ -109,9 +105,6 @@ def test_a_bag_becomes_a_recording(tmp_path: Path, storage: str) -> None:
     described = yaml.safe_load((out / "recording.yaml").read_text())
     assert "bag" not in described
     assert described["sensors"]["lidar_front"]["column_period_ns"] == PERIOD_NS
-    assert (out / "annotations" / "labels" / "1.txt").is_file()
-    assert (out / "trajectory.tum").is_file()
-    assert (out / "privacy_labels.csv").is_file()
 
 
 def test_the_same_bag_gives_the_same_bytes(tmp_path: Path) -> None:

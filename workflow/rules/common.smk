@@ -6,6 +6,7 @@ from card.artifacts.documents import read_yaml
 from card.artifacts.schemas import check, load_schema, with_defaults
 from card.errors import CardError
 from card.packaging.summary import summarize
+from card.recording.description import check_identity
 from card.recording.fingerprint import fingerprint
 from card.recording.sheet import read_sequences
 from card.recording.space import require_space

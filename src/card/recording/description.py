@@ -11,6 +11,7 @@ from card.artifacts.documents import read_yaml
 from card.artifacts.schemas import check
 from card.errors import CardError
 from card.recording.paths import description_path
+from card.recording.sheet import Sequence
 
 
 def read_description(root: Path) -> dict[str, Any]:
@@ -32,3 +33,19 @@ def write_description(root: Path, description: Mapping[str, Any]) -> None:
     check(dict(description), "recording", path)
     with atomic_file(path) as partial:
         partial.write_text(yaml.safe_dump(dict(description), sort_keys=True), encoding="utf-8")
+
+
+def check_identity(root: Path, sequence: Sequence) -> None:
+    """Raises CardError where the sheet's row and recording.yaml name another drive or country.
+
+    The country decides the licence, so the two must not contradict each other.
+    """
+    description = read_description(root)
+    for field in ("id", "country"):
+        if description[field] != getattr(sequence, field):
+            raise CardError(
+                f"{field} differs from the sheet",
+                where=description_path(root),
+                found=description[field],
+                wanted=getattr(sequence, field),
+            )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -23,16 +22,13 @@ from card.recording.hesai.packet import COLUMN_PERIOD_NS
 from card.recording.laz import write_burst
 from card.recording.paths import CAMERAS, LIDARS, burst_path, description_path, image_path, imu_path
 
-# What lies beside the sensors' data and no bag carries.
-_CARRIED_OVER = ("annotations", "trajectory.tum", "privacy_labels.csv")
-
 
 def import_bag(*, recording: Path, out: Path, report: Path, settings: Mapping[str, Any]) -> None:
     """Write the drive that `recording` holds as a bag to `out`, in the raw layout.
 
     recording: folder with a recording.yaml that has a ``bag`` section; see schema ``recording``.
-    out: folder, built whole: recording.yaml without that section, the sensors' data, and what lay
-    beside the bag (annotations, trajectory, privacy labels).
+    out: folder, built whole: recording.yaml without that section and the sensors' data. What lies
+    beside the bag (annotations, trajectory, privacy labels) is read where it is.
     settings: as schema ``settings/ingest``.
 
     A free-running sensor is put on the host's clock (see `fit_clock`); for one that is synchronised
@@ -75,11 +71,6 @@ def import_bag(*, recording: Path, out: Path, report: Path, settings: Mapping[st
                 counts |= _write_bursts(source, applied, target, recording, description)
             else:
                 counts["imu_measurements"] = _write_imu(source, applied, target)
-        for name in _CARRIED_OVER:
-            if (recording / name).is_dir():
-                shutil.copytree(recording / name, target / name)
-            elif (recording / name).is_file():
-                shutil.copyfile(recording / name, target / name)
         write_description(target, {key: value for key, value in description.items() if key != "bag"})
     write_report(
         report,

@@ -10,18 +10,6 @@ from card.errors import CardError
 from card.recording.paths import CAMERAS, LIDARS, description_path, imu_path, list_bursts, list_images
 
 
-def check_identity(recording: Path, description: Mapping[str, Any], sequence: Mapping[str, Any]) -> None:
-    """Raises CardError where the sheet's row and recording.yaml name another drive or country."""
-    for field in ("id", "country"):
-        if description[field] != sequence[field]:
-            raise CardError(
-                f"{field} differs from the sheet",
-                where=description_path(recording),
-                found=description[field],
-                wanted=sequence[field],
-            )
-
-
 def sensor_files(
     recording: Path, description: Mapping[str, Any], sequence: Mapping[str, Any]
 ) -> dict[str, list[Path]]:

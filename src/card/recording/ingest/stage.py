@@ -19,7 +19,7 @@ from card.recording.ingest.frames import frame_table
 from card.recording.ingest.images import check_images
 from card.recording.ingest.imu import check_imu
 from card.recording.ingest.ledger import number_frames
-from card.recording.ingest.modalities import check_identity, sensor_files
+from card.recording.ingest.modalities import sensor_files
 from card.recording.ingest.stamps import largest_gap_ns, share_within
 from card.recording.paths import CAMERAS, IMU, LIDARS, description_path, stamp_of
 
@@ -50,7 +50,6 @@ def ingest(
         raise CardError(
             "recording is a bag", where=description_path(recording), wanted="format rosbag2 in the sheet"
         )
-    check_identity(recording, description, sequence)
     files = sensor_files(recording, description, sequence)
     stamps: dict[str, npt.NDArray[np.int64]] = {}
     limits: dict[str, int] = {}
