@@ -24,23 +24,23 @@ _EGO_COLOUR = (26, 28, 33)
 class BoardCameras:
     """The cameras before one set of surroundings, which are drawn once.
 
-    ego : (height, width) pixels of the left image that show the car itself.
+    ego : (height, width) by camera, pixels that show the car itself.
     """
 
     def __init__(self, rig: Rig, surroundings: Sequence[Quad]) -> None:
-        self._views, self._behind, self._ego = {}, {}, {}
+        self._views, self._behind = {}, {}
+        self.ego: dict[str, NDArray[np.bool_]] = {}
         for name in CAMERAS:
             camera, pose = rig.cameras[name], rig.rig_from[name]
             view = QuadView(camera, pose, samples=2 if camera.width > 1000 else 3)
             self._views[name], self._behind[name] = view, view.draw(surroundings)
-            self._ego[name] = ego_pixels(camera, pose)
-        self.ego: NDArray[np.bool_] = self._ego["camera_left"]
+            self.ego[name] = ego_pixels(camera, pose)
 
     def photograph(self, folder: Path, quads: Sequence[Quad], t_ns: int, rng: np.random.Generator) -> None:
         """Write camera_left/<t_ns>.jpg and camera_right/<t_ns + delay>.jpg below `folder`."""
         for name, delay_ns in zip(CAMERAS, (0, STEREO_DELAY_NS), strict=True):
             light = self._views[name].draw(quads, self._behind[name])
-            light[self._ego[name]] = _EGO_COLOUR
+            light[self.ego[name]] = _EGO_COLOUR
             path = folder / name / f"{t_ns + delay_ns}.jpg"
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(_developed(light, rng))

@@ -1,5 +1,7 @@
 """Where a board is held before a standing car, and what else is there: ground, wall, clutter."""
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,6 +19,7 @@ from card.simulation.quads import Quad
 from card.simulation.rig import CAMERAS, RIG_HEIGHT_M, Rig, lidar_elevations_rad
 
 Array = NDArray[np.float64]
+Masks = Mapping[str, NDArray[np.bool_]]
 
 NEAR_M = 1.4
 FAR_M = 6.0
@@ -36,18 +39,21 @@ def resolvable_px(camera: CameraModel) -> float:
     return min(_SQUARE_PX, _SQUARE_SHARE * camera.fx)
 
 
-def place_board(rig: Rig, ego: NDArray[np.bool_], rng: np.random.Generator, *, tilt_deg: float) -> Array:
+def place_board(rig: Rig, ego: Masks, rng: np.random.Generator, *, tilt_deg: float) -> Array:
     """A pose ``rig_from_board`` (4, 4) that both cameras see whole and the front LiDAR hits.
 
-    ego : (height, width) pixels of the left image that show the car itself; the board keeps clear of them.
+    ego : (height, width) by camera, pixels that show the car itself; the board keeps clear of them.
     tilt_deg : one sigma of the board's lean, turn and roll against upright and facing the car.
     """
     camera = rig.cameras["camera_left"]
-    camera_height, camera_width = ego.shape
+    baseline = float(np.linalg.norm(rig.rig_from["camera_right"][:3, 3] - rig.rig_from["camera_left"][:3, 3]))
     far = min(FAR_M, camera.fx * board.SQUARE_M / resolvable_px(camera))
     for _ in range(_TRIES):
         depth = rng.uniform(NEAR_M, far)
-        pixel = rng.uniform((0, 0), (camera_width, camera_height))
+        # Where the plate's middle may be for it to fit into both images, more or less.
+        half_size = 0.4 * camera.fx / depth * np.array(board.SIZE_M)
+        lowest = half_size + np.array([camera.fx * baseline / depth, 0.0])
+        pixel = rng.uniform(lowest, np.maximum((camera.width, camera.height) - half_size, lowest))
         centre = apply(rig.rig_from["camera_left"], depth * camera.rays(pixel))
         half = 0.5 * np.radians(np.clip(rng.normal(0, tilt_deg, 3), -40, 40))
         rotation = matrix_from_quaternion(np.concatenate([[1.0], half])) @ _UPRIGHT
@@ -91,7 +97,7 @@ def surroundings(rng: np.random.Generator) -> list[Quad]:
     return quads
 
 
-def _is_visible(rig: Rig, ego: NDArray[np.bool_], pose: Array) -> bool:
+def _is_visible(rig: Rig, ego: Masks, pose: Array) -> bool:
     points = plate_points(pose)
     if points[:, 2].min() < _GROUND_Z_M + 0.05 or points[:, 1].max() > FAR_M + 0.2:
         return False
@@ -108,7 +114,7 @@ def _is_visible(rig: Rig, ego: NDArray[np.bool_], pose: Array) -> bool:
         if (pixels < _BORDER_PX).any() or (pixels > limit).any():
             return False
         columns, rows = np.rint(pixels).astype(int).T
-        if ego[rows, columns].any():
+        if ego[name][rows, columns].any():
             return False
     x, y, z = apply(inverse(rig.rig_from["lidar_front"]), points).T
     elevation = np.arctan2(z, np.hypot(x, y))

@@ -22,6 +22,7 @@ from card.simulation.calibrations import (
 from card.simulation.ego import ego_pixels
 from card.simulation.lidar import PERIOD_NS
 from card.simulation.scales import scale_named
+from card.simulation.session_drive import write_session_drive
 
 VIEWS = {"tiny": 3, "demo": 12, "full": 500}
 """Board views a session."""
@@ -36,15 +37,15 @@ def simulate_session(session: str, *, folder: Path, truth: Path, scale: str, see
     """Write one session.
 
     folder : gets board.yaml, camera_left|camera_right/<t_ns>.jpg, lidar_front/<t_ns>.laz, calibration.json
-        (what the team delivers), ego_mask.png.
-    truth : gets calibration.json and board_poses.json.
+        (what the team delivers), ego_mask.png, drive/ (both LiDARs, the IMU, recording.yaml).
+    truth : gets calibration.json, board_poses.json and the drive's truth in drive/.
     """
     size, rig = scale_named(scale), session_rig(session, seed, scale)
     rng = np.random.default_rng([seed, *session.encode()])
     behind = surroundings(rng)
     cameras = BoardCameras(rig, behind)
     views: list[dict[str, Any]] = []
-    with atomic_folder(folder) as partial:
+    with atomic_folder(truth) as truth_partial, atomic_folder(folder) as partial:
         write_board_yaml(partial)
         (partial / "lidar_front").mkdir()
         for number in range(VIEWS[scale]):
@@ -59,10 +60,12 @@ def simulate_session(session: str, *, folder: Path, truth: Path, scale: str, see
         calibration = delivered_calibration(session, seed, scale, views=VIEWS[scale])
         write_json(partial / "calibration.json", calibration, "calibration")
         cv2.imwrite(str(partial / "ego_mask.png"), delivered_mask(calibration))
-    with atomic_folder(truth) as partial:
-        write_json(partial / "calibration.json", true_calibration(session, seed, scale), "calibration")
+        write_json(truth_partial / "calibration.json", true_calibration(session, seed, scale), "calibration")
         poses = {"schema": "board_poses", "views": views, "stations": []}
-        write_json(partial / "board_poses.json", poses, "board_poses")
+        write_json(truth_partial / "board_poses.json", poses, "board_poses")
+        write_session_drive(
+            session, folder=partial / "drive", truth=truth_partial / "drive", scale=scale, seed=seed
+        )
 
 
 def delivered_mask(calibration: dict[str, Any]) -> NDArray[np.uint8]:

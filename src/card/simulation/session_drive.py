@@ -1,0 +1,47 @@
+"""The short drive of a calibration session: rounds on a yard, for the rear LiDAR and the IMU."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from card.simulation.bodies import ego_body
+from card.simulation.calibrations import day_of
+from card.simulation.drives import TOWN, Drive
+from card.simulation.raycast import Scene, Tracer
+from card.simulation.rig import LIDARS
+from card.simulation.scales import scale_named
+from card.simulation.simulate import write_bursts, write_description, write_motion
+from card.simulation.world import world_of
+
+DURATION_S = {"tiny": 0.5, "demo": 4.0, "full": 60.0}
+"""How long LiDARs and IMU run; a round takes half a minute."""
+
+# Time of day, h UTC.
+_HOURS = {"start": 8.75, "mid": 12.75, "end": 17.75}
+
+
+def write_session_drive(session: str, *, folder: Path, truth: Path, scale: str, seed: int) -> None:
+    """Write a session's drive: LiDARs, IMU and recording.yaml to `folder`, its truth to `truth`.
+
+    The car turns both ways of the compass and crosses bumps, so that every axis of the IMU is excited.
+    """
+    drive = Drive(
+        session=session,
+        starts=_HOURS[day_of(session)[1]],
+        country="DE",
+        place="calibration yard",
+        section=TOWN,
+        road_class="C",
+        speeds=((0, 4.0), (4, 6.0), (12, 3.0), (20, 6.0), (60, 5.0)),
+        circuit=(25.0, 12.0),
+        bump_spacing=20.0,
+        house_depth=6.0,
+    )
+    size = replace(scale_named(scale), duration_s=DURATION_S[scale], camera_start_s=0.0)
+    world = world_of(f"{session}-drive", drive, size, seed)
+    folder.mkdir(parents=True)
+    truth.mkdir(parents=True)
+    write_motion(world, folder, truth)
+    tracer, ego = Tracer(world.static, world.movers), Scene(ego_body())
+    for lidar in LIDARS:
+        write_bursts(world, tracer, ego, lidar, folder, truth)
+    write_description(world, folder, cameras=())
