@@ -57,8 +57,8 @@ def test_every_coefficient_outside_the_mask_is_identical(tmp_path, layout, size,
         box(
             min(a, c) * (width - 1),
             min(b, d) * (height - 1),
-            max(a, c) * (width - 1),
-            max(b, d) * (height - 1),
+            max(a, c) * (width - 1) + 1e-3,
+            max(b, d) * (height - 1) + 1e-3,
         )
         for a, b, c, d in corners
     ]
@@ -143,6 +143,7 @@ def test_five_hundred_boxes_fill_their_union():
         (box(100, 5, 120, 9), "outside the image"),
         (box(float("nan"), 5, 7, 9), "without an extent"),
         (box(9, 5, 7, 9), "without an extent"),
+        (box(7, 3.5, 9, 3.5), "without an extent"),
     ],
 )
 def test_a_box_that_makes_no_sense_is_an_error(wrong, message):

@@ -20,15 +20,6 @@ from card.privacy.markers import sanitized
 from card.privacy.recall import read_labels
 from card.privacy.redaction import redact
 
-HAAR_SETTINGS = (
-    "face_cascades",
-    "plate_cascades",
-    "scale_step",
-    "min_neighbors",
-    "face_growth",
-    "plate_growth",
-)
-
 
 def anonymize(
     *,
@@ -85,7 +76,9 @@ def anonymize(
 
 
 def _detector(settings: Mapping[str, Any]) -> Detector:
-    return HaarDetector(**{name: settings[name] for name in HAAR_SETTINGS})
+    return HaarDetector(
+        face=settings["face"], plate=settings["plate"], min_neighbors=settings["min_neighbors"]
+    )
 
 
 def _jobs(recording: Path, table: Any, folder: Path) -> list[Job]:

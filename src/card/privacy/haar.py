@@ -1,6 +1,6 @@
 """The embedded detector: the Haar cascades that OpenCV ships."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -18,62 +18,60 @@ class HaarDetector:
 
     Parameters
     ----------
-    face_cascades, plate_cascades : names of cascade files in OpenCV's data folder, without ``.xml``.
-    scale_step : factor (> 1) between neighbouring sizes of the image pyramid.
+    face, plate : how each kind is searched for, as ``settings/privacy``: ``cascades`` (names of files in
+        OpenCV's data folder, without ``.xml``), ``scale_step`` (> 1, between sizes of the image pyramid),
+        ``enlargement`` (>= 1, of the image before the search) and ``growth`` (share of a box's width and
+        height added on each side).
     min_neighbors : raw windows that must agree on a box; this count is the score.
-    face_growth, plate_growth : share of a box's width and height added on each side. A face cascade marks
-        brows to chin, a plate cascade the characters.
 
     Raises ``CardError`` for a cascade that the installed OpenCV does not have.
     """
 
     name = "opencv-haar"
 
-    def __init__(
-        self,
-        *,
-        face_cascades: Sequence[str],
-        plate_cascades: Sequence[str],
-        scale_step: float,
-        min_neighbors: int,
-        face_growth: float,
-        plate_growth: float,
-    ) -> None:
+    def __init__(self, *, face: Mapping[str, Any], plate: Mapping[str, Any], min_neighbors: int) -> None:
         # Worker processes share the cores already, and one thread keeps the boxes in one order.
         cv2.setNumThreads(1)
         self.version = cv2.__version__
-        self._scale_step = scale_step
+        self._searches: dict[Kind, Mapping[str, Any]] = {"face": face, "plate": plate}
         self._min_neighbors = min_neighbors
-        self._growth: dict[Kind, float] = {"face": face_growth, "plate": plate_growth}
-        self._cascades: list[tuple[Kind, str, Any]] = []
-        models: dict[str, str] = {}
-        kinds: tuple[tuple[Kind, Sequence[str]], ...] = (("face", face_cascades), ("plate", plate_cascades))
-        for kind, names in kinds:
-            for name in names:
-                path = cascade_path(name)
-                self._cascades.append((kind, name, cv2.CascadeClassifier(str(path))))
-                models[name] = sha256_file(path)
-        self.models: Mapping[str, str] = models
+        files = {name: cascade_path(name) for name in (*face["cascades"], *plate["cascades"])}
+        self._cascades = {name: cv2.CascadeClassifier(str(path)) for name, path in files.items()}
+        self.models: Mapping[str, str] = {name: sha256_file(path) for name, path in files.items()}
 
     def detect(self, image: npt.NDArray[np.uint8]) -> list[Detection]:
         """Boxes in ``image``, (H, W, 3) uint8 BGR: cascade by cascade, each sorted by place."""
         grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
         found: list[Detection] = []
-        for kind, name, cascade in self._cascades:
-            boxes, neighbors = cascade.detectMultiScale2(
-                grey, scaleFactor=self._scale_step, minNeighbors=self._min_neighbors
+        for kind, search in self._searches.items():
+            zoom = search["enlargement"]
+            pixels = (
+                cv2.resize(grey, None, fx=zoom, fy=zoom, interpolation=cv2.INTER_CUBIC) if zoom > 1 else grey
             )
-            rows = sorted(
-                (*(int(value) for value in box), int(count))
-                for box, count in zip(boxes, neighbors, strict=True)
-            )
-            found += [
-                Detection(
-                    kind, x - 0.5, y - 0.5, x + width - 0.5, y + height - 0.5, score=float(count), source=name
-                ).grown(self._growth[kind])
-                for x, y, width, height, count in rows
-            ]
+            for name in search["cascades"]:
+                found += self._search(pixels, kind, name, search)
         return found
+
+    def _search(self, pixels: Any, kind: Kind, name: str, search: Mapping[str, Any]) -> list[Detection]:
+        boxes, neighbors = self._cascades[name].detectMultiScale2(
+            pixels, scaleFactor=search["scale_step"], minNeighbors=self._min_neighbors
+        )
+        rows = sorted(
+            (*(int(value) for value in box), int(count)) for box, count in zip(boxes, neighbors, strict=True)
+        )
+        zoom = search["enlargement"]
+        return [
+            Detection(
+                kind,
+                x / zoom - 0.5,
+                y / zoom - 0.5,
+                (x + width) / zoom - 0.5,
+                (y + height) / zoom - 0.5,
+                score=float(count),
+                source=name,
+            ).grown(search["growth"])
+            for x, y, width, height, count in rows
+        ]
 
 
 def cascade_path(name: str) -> Path:

@@ -112,7 +112,7 @@ def _area(
 ) -> Area:
     edges = np.array([box.x_min, box.y_min, box.x_max, box.y_max])
     size = np.array([shape[1], shape[0]])
-    if not np.isfinite(edges).all() or (edges[2:] < edges[:2]).any():
+    if not np.isfinite(edges).all() or (edges[2:] <= edges[:2]).any():
         raise CardError("box without an extent", where=where, found=edges.tolist())
     # Pixel i reaches from i - 0.5 to i + 0.5: every pixel the box touches goes.
     low = np.clip(np.floor(edges[:2] - dilation_px + 0.5), 0, None).astype(int)
