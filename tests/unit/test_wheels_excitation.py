@@ -157,7 +157,7 @@ def test_the_road_is_found_under_each_wheel(result: Any, wheel: str) -> None:
     assert not gap.any()
     error = np.abs(samples[:, 3] - road(samples[:, 1], samples[:, 2]))
     t = (samples[:, 0] - START_NS) / 1e9
-    rolling = np.abs(along(t + 0.05) - along(t - 0.05)) > 0.15
+    rolling = np.minimum(np.abs(along(t + 0.05) - along(t)), np.abs(along(t) - along(t - 0.05))) > 0.07
     assert 0.7 < rolling.mean() < 0.9
     assert error[rolling].max() < 1e-3
     assert error.max() < 1.5e-3
