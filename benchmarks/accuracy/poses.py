@@ -1,0 +1,78 @@
+"""Trajectory errors against the simulated motion: ATE, RPE over a second, and tilt."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from card.artifacts import read_table
+from card.geometry import Trajectory, apply, inverse
+
+Array = NDArray[np.float64]
+AIMS = {"ate_cm": (1.5, "cm"), "rpe_1s_cm": (0.4, "cm"), "tilt_deg": (0.01, "deg")}
+SECOND_NS = 1_000_000_000
+
+
+def rows(work: Path, truth: Path, sequences: Sequence[str]) -> list[dict[str, Any]]:
+    """Medians over the sequences of the root mean square errors.
+
+    work : folder with ``results/<id>/trajectory.parquet``; truth : with ``<id>/trajectory.parquet``.
+    """
+    errors: list[dict[str, float]] = []
+    for sequence in sequences:
+        files = [work / "results" / sequence / "trajectory.parquet", truth / sequence / "trajectory.parquet"]
+        if all(file.is_file() for file in files):
+            found, true = (Trajectory.from_table(read_table(file, "trajectory")) for file in files)
+            errors.append(trajectory_errors(found, true))
+    return [
+        {
+            "stage": "poses",
+            "figure": figure,
+            "value": float(np.median([error[figure] for error in errors])) if errors else None,
+            "unit": unit,
+            "aim": aim,
+            "better": "lower",
+        }
+        for figure, (aim, unit) in AIMS.items()
+    ]
+
+
+def trajectory_errors(found: Trajectory, true: Trajectory) -> dict[str, float]:
+    """Root mean squares at the times of `found` that `true` covers.
+
+    ate_cm : positions after the best rigid alignment. rpe_1s_cm : translation of the relative pose over 1 s.
+    tilt_deg : angle between the two directions of up, seen from the rig.
+    """
+    t_ns = found.t_ns[(found.t_ns >= true.start_ns) & (found.t_ns <= true.end_ns)]
+    poses, reference = found.at(t_ns), true.at(t_ns)
+    aligned = apply(align(poses[:, :3, 3], reference[:, :3, 3]), poses[:, :3, 3])
+    ate = np.linalg.norm(aligned - reference[:, :3, 3], axis=1)
+    later = t_ns[t_ns + SECOND_NS <= t_ns[-1]] + SECOND_NS
+    step, true_step = (
+        inverse(start[: len(later)]) @ path.at(later) for start, path in ((poses, found), (reference, true))
+    )
+    rpe = np.linalg.norm((inverse(true_step) @ step)[:, :3, 3], axis=1)
+    # The third row of world_from_rig is the world's up in rig.
+    sine = np.linalg.norm(np.cross(poses[:, 2, :3], reference[:, 2, :3]), axis=1)
+    return {
+        "ate_cm": 100 * _rms(ate),
+        "rpe_1s_cm": 100 * _rms(rpe),
+        "tilt_deg": _rms(np.degrees(np.arcsin(sine))),
+    }
+
+
+def align(points: Array, reference: Array) -> Array:
+    """The rigid transform (4, 4) that brings points (N, 3) closest to a reference (N, 3), by Kabsch."""
+    center, reference_center = points.mean(axis=0), reference.mean(axis=0)
+    u, _, vt = np.linalg.svd((reference - reference_center).T @ (points - center))
+    rotation = u @ np.diag([1, 1, np.sign(np.linalg.det(u @ vt))]) @ vt
+    result = np.eye(4)
+    result[:3, :3] = rotation
+    result[:3, 3] = reference_center - rotation @ center
+    return result
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
