@@ -10,6 +10,7 @@ import yaml
 
 from card.artifacts import check, read_arrays, read_json, read_table, read_yaml
 from card.artifacts.open3d import import_open3d
+from card.errors import CardError
 from card.geometry import CameraModel, Trajectory, apply, from_json, inverse
 from card.recording.description import read_description
 from card.recording.laz import read_burst
@@ -176,15 +177,27 @@ def test_the_drive_s_points_lie_on_its_world_by_the_session_s_calibration(
     assert np.mean(distance < 0.02) > 0.97
 
 
-def test_same_seed_same_bytes_other_seed_other_session(tmp_path: Path) -> None:
-    def run(name: str, seed: int) -> dict[str, bytes]:
-        root = tmp_path / name
-        simulate_session(SESSION, folder=root / "s", truth=root / "t", scale="tiny", seed=seed)
-        simulate_survey("2026-04-14", folder=root / "v", truth=root / "u", scale="tiny", seed=seed)
-        return {str(p.relative_to(root)): p.read_bytes() for p in sorted(root.rglob("*")) if p.is_file()}
+def _session_and_survey(root: Path, seed: int) -> dict[str, bytes]:
+    simulate_session(SESSION, folder=root / "s", truth=root / "t", scale="tiny", seed=seed)
+    simulate_survey("2026-04-14", folder=root / "v", truth=root / "u", scale="tiny", seed=seed)
+    return {str(p.relative_to(root)): p.read_bytes() for p in sorted(root.rglob("*")) if p.is_file()}
 
-    first, again, other = run("a", 1), run("b", 1), run("c", 2)
-    assert first == again
-    measured = [name for name in first if name.endswith((".jpg", ".laz", ".csv", "imu.parquet"))]
-    assert len(measured) > 30
-    assert all(first[name] != other[name] for name in measured)
+
+def test_same_seed_same_bytes(tmp_path: Path) -> None:
+    first = _session_and_survey(tmp_path / "a", 1)
+    assert {"s/ego_mask.png", "s/drive/imu.parquet", "v/survey-3/points.csv"} < first.keys()
+    assert first == _session_and_survey(tmp_path / "b", 1)
+
+
+def test_another_seed_makes_another_survey(tmp_path: Path) -> None:
+    for seed in (1, 2):
+        root = tmp_path / str(seed)
+        simulate_survey("2026-04-14", folder=root / "v", truth=root / "u", scale="tiny", seed=seed)
+    for one in (p for p in (tmp_path / "1").rglob("*.*") if p.suffix in (".jpg", ".csv")):
+        assert one.read_bytes() != (tmp_path / "2" / one.relative_to(tmp_path / "1")).read_bytes()
+
+
+def test_a_survey_of_no_day_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(CardError, match="not a session"):
+        simulate_survey("14 April", folder=tmp_path / "v", truth=tmp_path / "u", scale="tiny", seed=0)
+    assert not any(tmp_path.iterdir())

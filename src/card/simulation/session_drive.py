@@ -5,7 +5,7 @@ from pathlib import Path
 
 from card.simulation.bodies import ego_body
 from card.simulation.calibrations import day_of
-from card.simulation.drives import TOWN, Drive
+from card.simulation.drives import DRIVES, TOWN, Drive
 from card.simulation.raycast import Scene, Tracer
 from card.simulation.rig import LIDARS
 from card.simulation.scales import scale_named
@@ -22,12 +22,13 @@ _HOURS = {"start": 8.75, "mid": 12.75, "end": 17.75}
 def write_session_drive(session: str, *, folder: Path, truth: Path, scale: str, seed: int) -> None:
     """Write a session's drive: LiDARs, IMU and recording.yaml to `folder`, its truth to `truth`.
 
-    The car turns both ways of the compass and crosses bumps, so that every axis of the IMU is excited.
+    The car goes round a block and over bumps, so that every axis of the IMU is excited.
     """
+    day, part = day_of(session)
     drive = Drive(
         session=session,
-        starts=_HOURS[day_of(session)[1]],
-        country="DE",
+        starts=_HOURS[part],
+        country=next((d.country for d in DRIVES.values() if d.day == day), "DE"),
         place="calibration yard",
         section=TOWN,
         road_class="C",

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from card.artifacts import atomic_folder, write_json
+from card.artifacts import atomic_folder, progress, write_json
 from card.geometry import CameraModel, from_json, to_json
 from card.recording.laz import write_burst
 from card.simulation.board_images import BoardCameras, write_board_yaml
@@ -48,7 +48,7 @@ def simulate_session(session: str, *, folder: Path, truth: Path, scale: str, see
     with atomic_folder(truth) as truth_partial, atomic_folder(folder) as partial:
         write_board_yaml(partial)
         (partial / "lidar_front").mkdir()
-        for number in range(VIEWS[scale]):
+        for number in progress(range(VIEWS[scale]), f"{session} board"):
             rig_from_board = place_board(rig, cameras.ego, rng, tilt_deg=_TILT_DEG)
             shown = board_quads(rig_from_board)
             t_ns = session_start_ns(session) + number * _VIEW_NS
