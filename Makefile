@@ -50,4 +50,4 @@ docs: setup
 	$(BIN)/python docs/configuration.py
 
 rulegraph: setup
-	snakemake --rulegraph | dot -Tsvg > docs/rulegraph.svg
+	snakemake --rulegraph --quiet all | dot -Tsvg > docs/rulegraph.svg

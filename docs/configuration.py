@@ -35,7 +35,14 @@ def page() -> str:
     ]
     text = ["# Configuration", "", config["description"], "Generated from `schemas/` by `make docs`.", ""]
     for title, schema, prefix in sections:
-        text += [f"## {title}", "", schema["description"], "", "| setting | default | meaning |", "|---|---|---|"]
+        text += [
+            f"## {title}",
+            "",
+            schema["description"],
+            "",
+            "| setting | default | meaning |",
+            "|---|---|---|",
+        ]
         text += [*rows(schema, prefix), ""]
     return "\n".join(text)
 
