@@ -117,8 +117,8 @@ class _Work:
             write_arrays(
                 self.folder / f"{task.frame:06d}.npz", {"points": frame.points}, "ground_truth_points"
             )
-            pixels = len(np.unique(frame.pixels, axis=0))
-            share = pixels / (self.camera.image.width * self.camera.image.height)
+            width, height = self.camera.image.width, self.camera.image.height
+            share = len(np.unique(frame.pixels @ (1, width))) / (width * height)
             yield {"frame": task.frame, **selected.columns, **frame.counts, "image_share": share}
 
 

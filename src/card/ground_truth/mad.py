@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+_LOW = (1 << 32) - 1
+
 
 def mad_inliers(
     voxel: npt.NDArray[np.int32],
@@ -21,22 +23,25 @@ def mad_inliers(
 
     Parameters
     ----------
-    voxel : (N,) the voxel of each point, in any order.
+    voxel : (N,) the voxel of each point, in any order, not negative.
     points : (N, 3) metres, relative to anything that is the same for a whole voxel.
+
+    Radii and deviations are float32.
     """
     if not len(voxel):
         return np.zeros(0, dtype=np.bool_)
-    order = np.argsort(voxel, kind="stable")
-    groups = voxel[order]
+    # Sorting whole numbers that hold voxel and position is many times faster than a stable argsort.
+    packed = np.sort((voxel.astype(np.int64) << 32) | np.arange(len(voxel)))
+    order, groups = packed & _LOW, packed >> 32
     starts = np.flatnonzero(np.r_[True, groups[1:] != groups[:-1]])
     counts = np.diff(np.r_[starts, len(groups)])
     ordered = points[order].astype(np.float64)
     means = np.add.reduceat(ordered, starts) / counts[:, None]
     group = np.repeat(np.arange(len(starts)), counts)
-    radii = np.linalg.norm(ordered - means[group], axis=1)
+    radii = np.linalg.norm(ordered - means[group], axis=1).astype(np.float32)
     deviations = np.abs(radii - _medians(radii, group, starts, counts)[group])
     mad = _medians(deviations, group, starts, counts)
-    inliers = (deviations if form == "deviation" else radii) <= multiplier * mad[group]
+    inliers = (deviations if form == "deviation" else radii) <= np.float32(multiplier) * mad[group]
     inliers &= (np.add.reduceat(inliers, starts, dtype=np.int64) >= min_inliers)[group]
     result = np.empty(len(voxel), dtype=np.bool_)
     result[order] = inliers
@@ -44,11 +49,13 @@ def mad_inliers(
 
 
 def _medians(
-    values: npt.NDArray[np.float64],
+    values: npt.NDArray[np.float32],
     group: npt.NDArray[np.int64],
     starts: npt.NDArray[np.int64],
     counts: npt.NDArray[np.int64],
-) -> npt.NDArray[np.float64]:
-    """Median (G,) of each run of values; of an even number the mean of the middle two, as numpy does."""
-    ranked = values[np.lexsort((values, group))]
-    return (ranked[starts + (counts - 1) // 2] + ranked[starts + counts // 2]) / 2
+) -> npt.NDArray[np.float32]:
+    """Median (G,) of each run of values >= 0; of an even number the mean of the middle two, as numpy does."""
+    # Floats that are not negative sort as their bits do.
+    packed = np.sort((group << 32) | values.view(np.int32))
+    ranked = (packed & _LOW).astype(np.int32).view(np.float32)
+    return (ranked[starts + (counts - 1) // 2] + ranked[starts + counts // 2]) / np.float32(2)

@@ -141,19 +141,21 @@ class SweepRays:
 
     def _seen_by_sensor(self, places: Floats) -> Floats:
         """Places (P, 3) in the frame of the moving sensor at the time at which it looked at them."""
-        pose = np.full(len(places), len(self._rotations) // 2)
-        fired = np.empty_like(places)
+        middle = len(self._rotations) // 2
+        fired = (places - self._translations[middle]) @ self._rotations[middle]
+        pose = np.full(len(places), middle)
         open_ = np.arange(len(places))
         for _ in range(_ROUNDS):
-            at = pose[open_]
-            fired[open_] = np.einsum(
-                "nji,nj->ni", self._rotations[at], places[open_] - self._translations[at]
-            )
             azimuth = np.arctan2(fired[open_, 0], fired[open_, 1])
-            pose[open_] = self._pose_at[_azimuth_bin(azimuth)]
-            open_ = open_[np.abs(pose[open_] - at) > 1]
+            seen = self._pose_at[_azimuth_bin(azimuth)]
+            moved = np.abs(seen - pose[open_]) > 1
+            open_, seen = open_[moved], seen[moved]
             if not len(open_):
                 break
+            pose[open_] = seen
+            fired[open_] = np.einsum(
+                "nji,nj->ni", self._rotations[seen], places[open_] - self._translations[seen]
+            )
         return fired
 
 
