@@ -48,6 +48,7 @@ class CentreLine:
         """Points (..., 2) at lateral offset d (m, right positive)."""
         tangent = self.at(s, 1)
         right = np.stack([tangent[..., 1], -tangent[..., 0]], axis=-1)
+        right /= np.linalg.norm(tangent, axis=-1, keepdims=True)
         return self.at(s) + np.asarray(d)[..., None] * right
 
     def project(self, xy: Array, guess: ArrayLike) -> tuple[Array, Array]:
@@ -58,7 +59,8 @@ class CentreLine:
             slope = np.sum(tangent * tangent, -1) - np.sum(gap * self.at(s, 2), -1)
             s += np.sum(gap * tangent, -1) / slope
         gap, tangent = xy - self.at(s), self.at(s, 1)
-        return s, gap[..., 0] * tangent[..., 1] - gap[..., 1] * tangent[..., 0]
+        across = gap[..., 0] * tangent[..., 1] - gap[..., 1] * tangent[..., 0]
+        return s, across / np.linalg.norm(tangent, axis=-1)
 
 
 def winding(length: float, start: float, bend: float, rng: np.random.Generator) -> CentreLine:

@@ -18,7 +18,8 @@ Array = NDArray[np.float64]
 
 #: Movers farther than this are out of every sensor's reach.
 REACH_M = 150.0
-_BLOCK = 1 << 16
+#: Rays are sorted out in runs of neighbours, so that most movers can be ruled out for a whole run.
+_BLOCK = 2048
 
 
 @dataclass(frozen=True)
@@ -99,13 +100,22 @@ class Gallery:
         reach = self._radius + spread + np.linalg.norm(ends[1] - ends[0], axis=1) / 2 + 0.05
         close = np.flatnonzero(distance - reach < REACH_M)
         least = np.where(distance <= reach, -2.0 * distance, np.sqrt(np.maximum(distance**2 - reach**2, 0)))
-        target, least = offset[close].T.astype(np.float32), least[close].astype(np.float32)
+        target, least, reach = offset[close], least[close], reach[close]
+        cone = np.arcsin(np.clip(reach / np.maximum(distance[close], 1e-9), 0, 1))
+        cone[distance[close] <= reach] = np.pi
         rays, found = [np.zeros(0, np.intp)], [np.zeros(0, np.intp)]
         for begin in range(0, len(directions), _BLOCK):
-            along = directions[begin : begin + _BLOCK].astype(np.float32) @ target
-            hit_ray, hit_mover = np.nonzero(along >= least - 1e-3)
+            block = directions[begin : begin + _BLOCK]
+            axis = block.mean(axis=0)
+            axis /= max(float(np.linalg.norm(axis)), 1e-9)
+            width = np.arccos(np.clip((block @ axis).min(), -1, 1))
+            apart = np.arccos(np.clip(target @ axis / np.maximum(distance[close], 1e-9), -1, 1))
+            some = np.flatnonzero(apart <= cone + width + 1e-3)
+            if not len(some):
+                continue
+            hit_mover, hit_ray = np.nonzero(target[some] @ block.T >= least[some, None] - 1e-6)
             rays.append(hit_ray + begin)
-            found.append(close[hit_mover])
+            found.append(close[some[hit_mover]])
         return np.concatenate(rays), np.concatenate(found)
 
     def _poses(self, mover: NDArray[np.intp], t_ns: NDArray[np.int64]) -> tuple[Array, Array]:

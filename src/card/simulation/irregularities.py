@@ -7,6 +7,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+#: A bump runs out to its sides over this length.
+BUMP_END_M = 0.3
+
 
 @dataclass(frozen=True)
 class Bump:
@@ -32,7 +35,7 @@ class Bump:
         x = np.clip(np.abs(s - self.s) / (self.length / 2), 0.0, 1.0)
         if self.profile == "flat":
             x = np.clip(2 * x - 1, 0.0, 1.0)
-        ends = np.clip(np.minimum(d - self.d_min, self.d_max - d) / 0.3, 0.0, 1.0)
+        ends = np.clip(np.minimum(d - self.d_min, self.d_max - d) / BUMP_END_M, 0.0, 1.0)
         return self.rise * 0.5 * (1 + np.cos(np.pi * x)) * _smooth(ends)
 
 

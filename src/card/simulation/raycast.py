@@ -64,6 +64,11 @@ class Scene:
         rays = np.concatenate(np.broadcast_arrays(origins, directions), axis=1).astype(np.float32)
         return np.asarray(self._scene.test_occlusions(self._tensor(rays), nthreads=1).numpy())
 
+    def distance(self, points: Array) -> Array:
+        """Distance (N,) of points (N, 3) to the nearest surface, m."""
+        near = self._scene.compute_distance(self._tensor(points.astype(np.float32)), nthreads=1)
+        return np.asarray(near.numpy(), dtype=np.float64)
+
 
 class Tracer:
     """The static world and all movers.

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from card.simulation.irregularities import Bump, Irregularity, Pothole
+from card.simulation.irregularities import BUMP_END_M, Bump, Irregularity, Pothole
 from card.simulation.mesh import Mesh, grid, grid_triangles, join
 from card.simulation.road import KERB_RUN_M, Road
 from card.simulation.surfaces import Surface
@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 
 FINE_STEP_M, COARSE_STEP_M = 0.1, 0.5
 #: Along a bump's profile, and both ways on a pothole's steep wall: under 1 mm from the function.
-BUMP_STEP_M, POTHOLE_STEP_M = 0.02, 0.0125
+BUMP_STEP_M, BUMP_END_STEP_M, POTHOLE_STEP_M = 0.02, 0.025, 0.0125
 SKIRT_M, SKIRT_DROP_M = 3.0, 0.4
 LAND_STEP_M, LAND_REACH_M = 4.0, 90.0
 
@@ -78,6 +78,13 @@ def _rows(road: Road, fine: tuple[float, float], whole: tuple[float, float]) -> 
 def _columns(road: Road) -> Array:
     section = road.section
     half = np.linspace(0.0, section.half_width, round(section.half_width / FINE_STEP_M) + 1)
+    ends = {thing.d_max for thing in road.irregularities if isinstance(thing, Bump)}
+    for end in sorted(ends):
+        half = np.concatenate(
+            [half, np.linspace(end - BUMP_END_M, end, round(BUMP_END_M / BUMP_END_STEP_M) + 1)]
+        )
+    half = np.unique(half)
+    half = half[np.concatenate([[True], np.diff(half) > 1e-3])]
     beyond = np.linspace(section.half_width + KERB_RUN_M, section.reach, round(section.side_width / 0.4) + 1)
     right = np.concatenate([half, beyond, [section.reach + SKIRT_M]])
     return np.concatenate([-right[:0:-1], right])

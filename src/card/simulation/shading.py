@@ -23,6 +23,7 @@ _TEXELS_M = (0.018, 0.12, 0.9)
 _NOISE_SIZE = 512
 _PAINT = np.array([0.62, 0.62, 0.60], np.float32)
 _BUMP_PAINT = np.array([0.62, 0.42, 0.05], np.float32)
+_JOINT, _FRAME = np.full(3, 0.17, np.float32), np.full(3, 0.75, np.float32)
 _GLASS = np.array([0.05, 0.06, 0.075], np.float32)
 _SUN, _SKY_LIGHT = np.array([1.05, 1.0, 0.9], np.float32), np.array([0.36, 0.40, 0.47], np.float32)
 _EXPOSURE = 1.5
@@ -79,22 +80,25 @@ class Shader:
         return np.asarray(values.ravel()[: len(wrapped)])
 
     def _marked(self, albedo: Image, surface: NDArray[np.uint8], uv: Image, pixel: Image) -> Image:
-        u, v = uv[:, 0], uv[:, 1]
-        if self._section.paved:
-            width = 0.06 + 0.2 * np.minimum(pixel, 0.2)
-            middle = (np.abs(v) < width) & (np.mod(u, 6) < 3)
-            edge = np.abs(np.abs(v) - (self._section.half_width - 0.2)) < width
-            albedo = np.where(((surface == Surface.ASPHALT) & (middle | edge))[:, None], _PAINT, albedo)
-        stripes = (surface == Surface.BUMP) & (np.mod(v, 1.0) < 0.5)
-        albedo = np.where(stripes[:, None], _BUMP_PAINT, albedo)
-        joints = (surface == Surface.SIDEWALK) & ((np.mod(u, 0.5) < 0.015) | (np.mod(v, 0.5) < 0.015))
-        albedo = np.where((joints & (pixel < 0.06))[:, None], 0.6 * albedo, albedo)
-        across, up = np.mod(u / 2.6, 1), (v - 1.0) / 2.9
-        pane = (np.abs(across - 0.5) < 0.2) & (np.abs(np.mod(up, 1) - 0.52) < 0.24) & (up > 0.05)
-        frame = (np.abs(across - 0.5) < 0.235) & (np.abs(np.mod(up, 1) - 0.52) < 0.28) & (up > 0.05)
-        facade = surface == Surface.FACADE
-        albedo = np.where((facade & frame)[:, None], 0.75, albedo)
-        return np.asarray(np.where((facade & pane)[:, None], _GLASS, albedo), np.float32)
+        """Albedo (K, 3) with lane markings, painted bumps, paving joints and windows; changed in place."""
+        for kind, paint in (
+            (Surface.ASPHALT, self._lanes if self._section.paved else None),
+            (Surface.BUMP, lambda u, v, _: [(np.mod(v, 1.0) < 0.5, _BUMP_PAINT)]),
+            (Surface.SIDEWALK, _joints),
+            (Surface.FACADE, _windows),
+        ):
+            chosen = np.flatnonzero(surface == kind)
+            if paint is None or not len(chosen):
+                continue
+            for where, colour in paint(uv[chosen, 0], uv[chosen, 1], pixel[chosen]):
+                albedo[chosen[where]] = colour
+        return albedo
+
+    def _lanes(self, u: Image, v: Image, pixel: Image) -> list[tuple[NDArray[np.bool_], Image]]:
+        width = 0.06 + 0.2 * np.minimum(pixel, 0.2)
+        middle = (np.abs(v) < width) & (np.mod(u, 6) < 3)
+        edge = np.abs(np.abs(v) - (self._section.half_width - 0.2)) < width
+        return [(middle | edge, _PAINT)]
 
     def _picture(self, thing: int, uv: Image, pixel: Image) -> Image:
         """Colours (K, 3) of a textured quad, from a version shrunk to what a pixel can resolve."""
@@ -125,6 +129,18 @@ class Shader:
     ) -> NDArray[np.bool_]:
         points = origins[lit] + directions[lit] * distance[lit, None] + 0.02 * normal[lit]
         return ~self._tracer.static.blocked(points, self._sun[None])
+
+
+def _joints(u: Image, v: Image, pixel: Image) -> list[tuple[NDArray[np.bool_], Image]]:
+    joint = (np.mod(u, 0.5) < 0.015) | (np.mod(v, 0.5) < 0.015)
+    return [(joint & (pixel < 0.06), _JOINT)]
+
+
+def _windows(u: Image, v: Image, pixel: Image) -> list[tuple[NDArray[np.bool_], Image]]:
+    across, up = np.abs(np.mod(u / 2.6, 1) - 0.5), (v - 1.0) / 2.9
+    middle = np.abs(np.mod(up, 1) - 0.52)
+    frame = (across < 0.235) & (middle < 0.28) & (up > 0.05)
+    return [(frame, _FRAME), (frame & (across < 0.2) & (middle < 0.24), _GLASS)]
 
 
 def sky(directions: Array, sun: Array | Image) -> Image:

@@ -55,12 +55,13 @@ class Traffic:
         drive, begin = self.drive, camera_start_s
         edge = drive.section.half_width
         if drive.crossing_s is not None:
-            stop = begin + drive.crossing_s
-            slow = drive.speeds[-1][1] if not any(v == 0 for _, v in drive.speeds) else 0.0
-            ahead = 4.4 if slow == 0 else 13.0
+            stops = any(speed == 0 for _, speed in drive.speeds)
+            # A car that does not stop must find them gone when it gets there.
+            ahead, early = (4.4, 0.0) if stops else (13.0, 1.4)
+            look = begin + drive.crossing_s
             for index, late in enumerate((-1.0, 0.4, 1.6)):
-                # Looks at the car while passing in front of it at time `stop` + late.
-                self.cross(self.course.at(stop) + ahead + 0.7 * index, stop + late, 1 if index != 1 else -1)
+                where = self.course.at(look) + ahead + 0.7 * index
+                self.cross(where, look + late - early, -1 if index == 1 else 1)
         if drive.walker_spacing:
             first = self.course.at(begin + 1.0) + 5.5
             for k in range(-2, 12):
