@@ -8,6 +8,7 @@ from typing import Any
 
 from card.artifacts import (
     atomic_folder,
+    progress,
     read_json,
     read_table,
     sha256_file,
@@ -19,8 +20,8 @@ from card.errors import CardError
 from card.packaging.croissant import croissant
 from card.packaging.metadata import write_metadata
 from card.packaging.mini import mini_columns
-from card.packaging.pages import SPLITS, write_pages
-from card.packaging.reader import Release
+from card.packaging.pages import write_pages
+from card.packaging.reader import SPLITS, Release
 
 SHIPPED_SCHEMAS = (
     "calibration",
@@ -66,7 +67,7 @@ def assemble(
     ordered = sorted(sequences, key=lambda item: item["id"])
     with atomic_folder(out) as tree:
         hashes: dict[str, str] = {}
-        for item in ordered:
+        for item in progress(ordered, f"assemble {repository}"):
             _check_license(item["id"], Path(item["package"]), spdx)
             hashes |= _place(item["id"], Path(item["package"]), tree)
         rows = [read_json(Path(item["package"]) / "sequence.json", "release_sequence") for item in ordered]

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from card.artifacts import load_schema
+from card.packaging.reader import SPLITS
 
 CONTEXT = {
     "@language": "en",
@@ -32,10 +33,7 @@ DATA_TYPES = {
     "string": "sc:Text",
 }
 TABLES = {
-    **{
-        f"metadata/frames-{split}.parquet": "release_frames"
-        for split in ("train", "validation", "test", "zero_shot", "unassigned")
-    },
+    **{f"metadata/frames-{split}.parquet": "release_frames" for split in SPLITS},
     "metadata/sequences.parquet": "release_sequences",
     "metadata/members.parquet": "release_members",
 }

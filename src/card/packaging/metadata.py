@@ -6,7 +6,7 @@ from typing import Any
 
 from card.artifacts import load_schema, read_table, write_table
 from card.errors import CardError
-from card.packaging.pages import SPLITS
+from card.packaging.reader import SPLITS
 
 SPLIT_COLUMNS = ("split", "group", "stratum", "sampled")
 

@@ -11,6 +11,7 @@ from card.artifacts import (
     Figure,
     atomic_folder,
     inventory,
+    progress,
     read_json,
     read_table,
     sha256_file,
@@ -170,7 +171,7 @@ def _write_members(
     (folder / "data").mkdir()
     names = ("file", "sequence", "modality", "frame", "burst", "shard", "offset", "size", "sha256", "spdx")
     columns: dict[str, list[Any]] = {name: [] for name in names}
-    for modality, found in sorted(entries.items()):
+    for modality, found in progress(sorted(entries.items()), f"pack {sequence}"):
         by_name = {entry.source.name: entry for entry in found}
         members = write_shards(
             (entry.source for entry in found), folder / "data", modality, settings["shard_max_bytes"]

@@ -9,8 +9,8 @@ import yaml
 
 from card.artifacts import load_schema
 from card.errors import CardError
+from card.packaging.reader import SPLITS
 
-SPLITS = ("train", "validation", "test", "zero_shot", "unassigned")
 COPIED = ("CONVENTIONS.md", "CHANGELOG.md")
 FILLED = ("README.md", "NOTICE", "CITATION.cff", "TAKEDOWN.md")
 SIZES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"))
@@ -125,8 +125,8 @@ def _counts(release: Mapping[str, Any], sequences: Sequence[Mapping[str, Any]]) 
     places = len({row["place"] for row in sequences})
     frames = sum(release["frames"].values())
     return (
-        f"{len(sequences)} sequences from {places} places, {seconds / 3600:.2f} h, {metres / 1000:.2f} km, "
-        f"{frames} frames, {release['files']} files, {release['bytes'] / 1e9:.2f} GB."
+        f"{len(sequences)} sequences from {places} places, {seconds / 3600:.3g} h, {metres / 1000:.3g} km, "
+        f"{frames} frames, {release['files']} files, {release['bytes'] / 1e9:.3g} GB."
     )
 
 
@@ -152,11 +152,11 @@ def _known_issues(release: Mapping[str, Any], sequences: Sequence[Mapping[str, A
         f"{item['reason']} (signed by {item['signed_by']})."
         for item in release["overrides"]
     ]
-    lines += [
-        f"- `{row['sequence']}`: {row['frames'] - row['reviewed_frames']} frames have labels nobody reviewed."
-        for row in sequences
-        if row["reviewed_frames"] < row["frames"]
-    ]
+    for row in sequences:
+        if left := row["frames"] - row["reviewed_frames"]:
+            lines.append(
+                f"- `{row['sequence']}`: labels of {left} of {row['frames']} frames are not reviewed."
+            )
     return "\n".join(lines) or "None known."
 
 

@@ -9,7 +9,6 @@ from typing import Any
 from card.artifacts import read_json, read_table
 from card.errors import CardError
 
-LIDARS = ("lidar_front", "lidar_rear")
 SPLITS = ("train", "validation", "test", "zero_shot", "unassigned")
 
 

@@ -7,8 +7,8 @@ from typing import Any
 
 from card.artifacts import read_json, read_table
 from card.errors import CardError
+from card.packaging.reader import SPLITS
 
-SPLITS = ("train", "validation", "test", "zero_shot", "unassigned")
 # Sidecars of a sequence; the first two stand for every one, the others as far as its modalities reach.
 SIDECARS = {
     "provenance.json": "provenance",

@@ -4,7 +4,8 @@ import re
 from collections.abc import Iterator
 
 from card.artifacts import sha256_file
-from card.packaging.checks.contents import SPLITS, Contents
+from card.packaging.checks.contents import Contents
+from card.packaging.reader import SPLITS
 
 REQUIRED = (
     "README.md", "LICENSE", "NOTICE", "CITATION.cff", "CHANGELOG.md", "CONVENTIONS.md", "TAKEDOWN.md",

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from card.artifacts import progress
 from card.packaging.checks.contents import Contents, Row
 from card.packaging.modalities import member_name
 
@@ -26,7 +27,7 @@ def check_members(contents: Contents) -> Iterator[str]:
     counts = Counter(row["file"] for row in contents.members)
     for name in sorted(name for name, count in counts.items() if count > 1):
         yield f"metadata/members.parquet: {name} is listed twice"
-    for shard, rows in sorted(by_shard.items()):
+    for shard, rows in progress(sorted(by_shard.items()), "check shards"):
         path = contents.tree / shard
         if path.is_file():
             yield from _check_shard(path, shard, rows, frames)

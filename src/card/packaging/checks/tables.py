@@ -5,9 +5,9 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 from card.packaging.checks.contents import Contents, Row
+from card.packaging.modalities import LIDARS
 
 PER_FRAME = ("camera_left", "camera_right", "ground_truth", "labels")
-LIDARS = ("lidar_front", "lidar_rear")
 
 
 def check_tables(contents: Contents) -> Iterator[str]:
