@@ -14,6 +14,7 @@ Array = NDArray[np.float64]
 LONGER_SIDE_PX = 1100
 MARGIN_M = 25.0
 HEIGHT_RANGE_M = (-0.2, 6.0)
+PALEST = 0.15  # what is lowest must still stand out from the paper
 TRACK = "#c2313f"
 SCALE_BARS_M = (5, 10, 20, 50, 100, 200, 500, 1000, 2000)
 
@@ -65,7 +66,8 @@ def highest_in_cells(voxels: Array, low: Array, cell_m: float, shape: tuple[int,
 def _voxels(
     drawing: Any, axes: Any, voxels: Array, track: Array, rig_height_m: float, low: Array, extent: Array
 ) -> None:
-    from matplotlib.colors import PowerNorm
+    from matplotlib import colormaps
+    from matplotlib.colors import ListedColormap, PowerNorm
     from scipy.spatial import cKDTree
 
     cell = max(0.2, float(extent.max()) / LONGER_SIDE_PX)
@@ -79,7 +81,7 @@ def _voxels(
         top,
         origin="lower",
         extent=(low[0], low[0] + shape[1] * cell, low[1], low[1] + shape[0] * cell),
-        cmap="YlGnBu",
+        cmap=ListedColormap(colormaps["YlGnBu"](np.linspace(PALEST, 1, 256))),
         norm=PowerNorm(0.5, *HEIGHT_RANGE_M),  # kerbs matter as much as gables
         interpolation="nearest",
     )

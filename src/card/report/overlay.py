@@ -13,6 +13,8 @@ PANEL_PX = 640
 DEPTH_RANGE_M = (3.0, 80.0)
 HEIGHT_RANGE_M = 0.25
 VEIL = 0.55
+# Walls and trees: there, but no topic of a map of the road.
+HIGHER = "#b9bec5"
 
 
 def draw_overlay(
@@ -35,7 +37,7 @@ def draw_overlay(
     small, shown = _shrink(image, camera)
     depth = rasterize(points, shown)
     panels = 2 if road_from_camera is None else 3
-    with figure(path, 3.4 * panels, 3.4 * image.shape[0] / image.shape[1] + 0.75) as drawing:
+    with figure(path, 3.4 * panels, 3.4 * image.shape[0] / image.shape[1] + 0.55) as drawing:
         axes, bars = drawing.subplots(2, panels, height_ratios=(40, 1), squeeze=False)
         bars[0].set_visible(False)
         axes[0].imshow(small)
@@ -91,14 +93,17 @@ def _height(
     camera: CameraModel,
     road_from_camera: NDArray[np.float64],
 ) -> None:
+    from matplotlib import colormaps
+
     v, u = np.nonzero(np.isfinite(depth))
     rays = camera.rays(np.stack([u, v], axis=1))
     height = np.full(depth.shape, np.nan)
     height[v, u] = depth[v, u] * (rays @ road_from_camera[2, :3]) + road_from_camera[2, 3]
     _veiled(axes, image)
     limit = HEIGHT_RANGE_M
-    shown = axes.imshow(height, cmap="RdYlBu_r", vmin=-limit, vmax=limit, interpolation="nearest")
-    axes.set_title("Height over the road plane")
+    colors = colormaps["RdYlBu_r"].with_extremes(over=HIGHER)
+    shown = axes.imshow(height, cmap=colors, vmin=-limit, vmax=limit, interpolation="nearest")
+    axes.set_title("Height over the road plane, what is higher in grey")
     bar = axes.figure.colorbar(shown, cax=bar_axes, orientation="horizontal", extend="both", extendfrac=0.02)
     bar.set_ticks([-limit, 0, limit], labels=[f"{-100 * limit:.0f}", "0", f"{100 * limit:.0f} cm"])
     _quiet(bar)
