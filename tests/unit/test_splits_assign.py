@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-from card.artifacts import default_settings, read_table, write_table
+from card.artifacts import default_settings, load_schema, read_table, write_table
+from card.cli import main
 from card.errors import CardError
 from card.splits import assign, extend_ledger
 from card.splits.extend import Drive, choose
@@ -189,3 +190,23 @@ def test_a_sequence_without_results_cannot_be_assigned(tmp_path: Path) -> None:
     ledger.write_text("\t".join(COLUMNS) + "\n")
     with pytest.raises(CardError, match=r"sequence a: the sequence is not processed yet"):
         extend_ledger(sequences=[sheet_row()], results=tmp_path / "results", ledger=ledger, settings=SETTINGS)
+
+
+def test_the_command_line_extends_the_ledger_of_the_config(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    licenses = Path(__file__).resolve().parents[2] / "config" / "licenses.yaml"
+    cells = "de_new\trecordings/de_new\tnative\tDE\ttown\t-\ttown\tsplit\tfalse\tall\t-"
+    header = "\t".join(load_schema("sequences")["properties"])
+    (tmp_path / "sheet.tsv").write_text(f"{header}\n{cells}\n")
+    (tmp_path / "splits.tsv").write_text("\t".join(COLUMNS) + "\n")
+    (tmp_path / "config.yaml").write_text(
+        f"sheet: sheet.tsv\nlicenses: {licenses}\nsplits_ledger: splits.tsv\n"
+        "splits: {train_share: 0, test_share: 1}\n"
+    )
+    write_inputs(tmp_path / "results" / "de_new")
+    monkeypatch.chdir(tmp_path)
+    assert main(["splits", "extend", "--config", "config.yaml"]) == 0
+    assert "1 rows appended to splits.tsv" in capsys.readouterr().out
+    row = (tmp_path / "splits.tsv").read_text().splitlines()[-1]
+    assert row == "de_new\t0\t-\ttest\tnegative/town\tde_new"
