@@ -50,7 +50,7 @@ def columns(count: int, number: int) -> tuple[NDArray[np.int64], Array]:
     """
     step = _STEP_UNITS // count
     units = number * 89 % step + step * np.arange(count)
-    return units * (PERIOD_NS // _STEP_UNITS), np.radians(units / 100)
+    return units * PERIOD_NS // _STEP_UNITS, np.radians(units / 100)
 
 
 def directions(azimuth: Array, elevation: Array) -> Array:

@@ -1,0 +1,157 @@
+"""A whole drive at the smallest scale: complete, repeatable, new with each seed, truthful in its labels."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from card.artifacts import inventory, read_arrays, read_table, read_yaml
+from card.errors import CardError
+from card.estimation.deskew import deskew_burst
+from card.geometry import Trajectory
+from card.recording.laz import read_burst
+from card.recording.paths import list_bursts, list_images, stamp_of
+from card.simulation.drives import DRIVES
+from card.simulation.labels import outline, road_boxes
+from card.simulation.raycast import Tracer
+from card.simulation.simulate import simulate_drive
+from card.simulation.world import World, build_world
+
+DRIVE = "de_town_bumps"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root = tmp_path_factory.mktemp("drive")
+    simulate_drive(DRIVE, recording=root / "recording", truth=root / "truth", scale="tiny", seed=5)
+    return root
+
+
+@pytest.fixture(scope="module")
+def world() -> World:
+    return build_world(DRIVE, "tiny", 5)
+
+
+def test_raw_layout_is_complete(folder: Path) -> None:
+    recording = folder / "recording"
+    description = read_yaml(recording / "recording.yaml", "recording")
+    assert (description["id"], description["day"], description["country"]) == (DRIVE, "2026-04-14", "DE")
+    left, right = (list_images(recording, name) for name in ("camera_left", "camera_right"))
+    assert len(left) == len(right) == 5
+    assert all(0 < stamp_of(r) - stamp_of(a) < 1_000_000 for a, r in zip(left, right, strict=True))
+    assert Image.open(left[0]).size == (140, 140)
+    assert len(list_bursts(recording, "lidar_front")) >= 58
+    imu = read_table(recording / "imu.parquet", "imu")
+    assert imu.num_rows == 1201
+    assert (recording / "trajectory.tum").is_file()
+    assert (recording / "annotations" / "classes.txt").read_text() == "positive\nnegative\n"
+    reviewed = {p.stem for p in (recording / "annotations" / "labels").iterdir()}
+    assert reviewed < {p.stem for p in left}  # some were not looked at
+    with (recording / "privacy_labels.csv").open() as lines:
+        assert next(csv.reader(lines)) == ["camera", "t_ns", "kind", "x_min", "y_min", "x_max", "y_max"]
+
+
+def test_points_lie_on_the_true_mesh_at_their_own_time(folder: Path, world: World) -> None:
+    truth = Trajectory.from_table(read_table(folder / "truth" / "trajectory.parquet", "trajectory"))
+    np.testing.assert_allclose(truth.translation_m[0], 0, atol=1e-9)
+    assert abs(truth.at(truth.start_ns)[0, 1]) < 1e-9  # no yaw at the start
+    static = Tracer(world.static, []).static
+    corrections = {
+        name: getattr(world.rig.lidar_corrections["lidar_front"], name)
+        for name in (
+            "range_offset_m",
+            "channel_range_offset_m",
+            "channel_elevation_offset_rad",
+            "channel_azimuth_offset_rad",
+        )
+    }
+    for path in list_bursts(folder / "recording", "lidar_front")[10:50:13]:
+        burst = read_burst(path)
+        met = read_arrays(folder / "truth" / "bursts" / "lidar_front" / f"{path.stem}.npz", "truth_burst")
+        assert len(met["surface"]) == len(burst)
+        points = deskew_burst(burst, world.rig.rig_from["lidar_front"], truth, corrections)
+        still = points[~met["dynamic"]]
+        away = static.distance(still)
+        assert np.quantile(away, 0.99) < 0.02
+        assert np.median(away) < 0.006
+
+
+def test_label_boxes_contain_the_feature(folder: Path, world: World) -> None:
+    table = read_table(folder / "truth" / "boxes.parquet", "truth_boxes").to_pylist()
+    rows = [r for r in table if r["camera"] == "camera_left" and r["kind"] in ("positive", "negative")]
+    assert rows
+    camera, pose = world.rig.cameras["camera_left"], world.rig.rig_from["camera_left"]
+    for row in rows:
+        thing = world.road.irregularities[row["thing"]]
+        from_world = np.linalg.inv(world.path.at(row["t_ns"]) @ pose)
+        points = outline(world.road, thing) @ from_world[:3, :3].T + from_world[:3, 3]
+        pixels = camera.project(points[points[:, 2] > 2])
+        inside = camera.contains(pixels)
+        assert inside.any()
+        u, v = pixels[inside].T
+        assert u.min() >= row["x_min"] - 0.51
+        assert u.max() <= row["x_max"] + 0.51
+        assert v.min() >= row["y_min"] - 0.51
+        assert v.max() <= row["y_max"] + 0.51
+
+
+def test_yolo_files_say_what_the_truth_says(folder: Path) -> None:
+    table = read_table(folder / "truth" / "boxes.parquet", "truth_boxes").to_pylist()
+    for path in (folder / "recording" / "annotations" / "labels").iterdir():
+        boxes = [
+            r
+            for r in table
+            if r["camera"] == "camera_left"
+            and r["t_ns"] == int(path.stem)
+            and r["kind"] in ("positive", "negative")
+        ]
+        lines = [line.split() for line in path.read_text().splitlines()]
+        assert len(lines) == len(boxes)
+        for (kind, *values), box in zip(lines, boxes, strict=True):
+            x, y, w, h = np.array(values, float) * 140
+            assert kind == ("0" if box["kind"] == "positive" else "1")
+            edges = [x - w / 2 - 0.5, y - h / 2 - 0.5, x + w / 2 - 0.5, y + h / 2 - 0.5]
+            np.testing.assert_allclose(
+                edges, [box[k] for k in ("x_min", "y_min", "x_max", "y_max")], atol=1e-3
+            )
+
+
+def test_hidden_features_get_no_box(world: World) -> None:
+    camera = world.rig.cameras["camera_left"]
+    nothing = np.full((camera.height, camera.width), -1, np.int32)
+    assert road_boxes(nothing, world.road, camera, np.eye(4)) == []
+
+
+def test_same_seed_same_bytes_another_seed_another_world(folder: Path, tmp_path: Path) -> None:
+    for seed in (5, 6):
+        simulate_drive(
+            DRIVE, recording=tmp_path / f"{seed}", truth=tmp_path / f"t{seed}", scale="tiny", seed=seed
+        )
+    first, again, other = (_hashes(p) for p in (folder / "recording", tmp_path / "5", tmp_path / "6"))
+    assert again == first
+    assert _hashes(tmp_path / "t5") == _hashes(folder / "truth")
+    changed = {name for name in first if other.get(name) != first[name]}
+    assert {"imu.parquet", "trajectory.tum"} <= changed
+    assert all(name in changed for name in first if name.endswith((".jpg", ".laz")))
+
+
+def test_unknown_drive_or_scale(tmp_path: Path) -> None:
+    with pytest.raises(CardError, match=r"unknown demo drive.*de_town_bumps"):
+        simulate_drive("xx", recording=tmp_path / "r", truth=tmp_path / "t", scale="tiny", seed=1)
+    with pytest.raises(CardError, match="unknown scale"):
+        simulate_drive(DRIVE, recording=tmp_path / "r", truth=tmp_path / "t", scale="huge", seed=1)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_five_drives_are_what_the_demo_promises() -> None:
+    assert [d.country for d in DRIVES.values()] == ["DE", "DE", "DE", "IT", "IT"]
+    assert [name for name, d in DRIVES.items() if d.bag] == ["de_gravel_offroad"]
+    assert [name for name, d in DRIVES.items() if d.circuit] == ["it_town_revisit"]
+    assert any(v == 0 for _, v in DRIVES["de_town_bumps"].speeds)
+
+
+def _hashes(root: Path) -> dict[str, str]:
+    table = inventory(root)
+    return dict(zip(table["name"], table["sha256"], strict=True))
