@@ -75,6 +75,7 @@ def excite(
         path,
         list(paths.values()),
         StaticVoxels(read_arrays(static_voxels, "static_voxels")),
+        settings["static_reach_voxels"],
         Corridor(settings["corridor_half_width_m"], settings["max_height_m"]),
         settings["arc_window_m"],
     )

@@ -58,6 +58,7 @@ def collect_samples(
     trajectory: Trajectory,
     paths: Sequence[ContactPath],
     static: StaticVoxels,
+    static_reach: int,
     corridor: Corridor,
     arc_window_m: float,
 ) -> list[tuple[Array, Array]]:
@@ -66,7 +67,9 @@ def collect_samples(
     A burst only serves the pass it was taken on: path within `arc_window_m` of where the wheel then was.
     """
     pieces: list[list[tuple[Array, Array]]] = [[(np.zeros(0), np.zeros(0))] for _ in paths]
-    for points, windows in _static_points(bursts, lidars, trajectory, paths, static, arc_window_m):
+    for points, windows in _static_points(
+        bursts, lidars, trajectory, paths, static, static_reach, arc_window_m
+    ):
         for piece, path, window in zip(pieces, paths, windows, strict=True):
             piece.append(corridor_samples(points, path, window, corridor))
     return [
@@ -80,9 +83,10 @@ def _static_points(
     trajectory: Trajectory,
     paths: Sequence[ContactPath],
     static: StaticVoxels,
+    static_reach: int,
     arc_window_m: float,
 ) -> Iterator[tuple[Array, list[tuple[float, float]]]]:
-    """World points (P, 3) of each burst near the paths and in static voxels, and the arc windows."""
+    """World points (P, 3) of each burst near the paths and the static voxels, and the arc windows."""
     for entry in bursts:
         lidar = lidars[entry.lidar]
         arcs = [float(path.arc_at(entry.t_start_ns)) for path in paths]
@@ -93,6 +97,6 @@ def _static_points(
         points = deskew_burst(
             burst, lidar.rig_from_lidar, trajectory, lidar.corrections, motion_compensate=not lidar.deskewed
         )
-        points = points[static.contain(points)]
+        points = points[static.near(points, static_reach)]
         if len(points):
             yield points, windows

@@ -1,6 +1,7 @@
 """Which points lie in the static voxels of a sequence."""
 
 from collections.abc import Mapping
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +20,22 @@ class StaticVoxels:
         self._extent = ids.max(axis=0) - self._low + 1 if len(ids) else np.zeros(3, dtype=np.int64)
         self._keys = np.sort(self._key(ids - self._low))
 
-    def contain(self, points: Array) -> NDArray[np.bool_]:
-        """Whether each of the points (N, 3), metres in world, lies in a static voxel."""
+    def near(self, points: Array, reach: int) -> NDArray[np.bool_]:
+        """Whether each of the points (N, 3), metres in world, lies at most `reach` voxels off a static one.
+
+        A reach of 0 is the voxel set itself; 1 also takes the voxels that touch it.
+        """
         voxel = np.floor((points - self._origin) / self._size).astype(np.int64) - self._low
+        steps = sorted(
+            product(range(-reach, reach + 1), repeat=3), key=lambda step: (np.abs(step).sum(), step)
+        )
+        found = np.zeros(len(points), dtype=bool)
+        for step in steps:
+            missing = np.flatnonzero(~found)
+            found[missing] = self._contain(voxel[missing] + np.array(step))
+        return found
+
+    def _contain(self, voxel: NDArray[np.int64]) -> NDArray[np.bool_]:
         within = np.all((voxel >= 0) & (voxel < self._extent), axis=1)
         if not within.any():
             return within
