@@ -107,7 +107,8 @@ class Drive:
     def _read(self, i: int) -> Sweep:
         burst, lidar = read_burst(self.files[i]), self.sensor(i)
         real = np.linalg.norm(burst.points, axis=1) >= self._settings["min_range_m"]
-        inside = _crop(burst.points, self._settings["front_crop" if self.front[i] else "rear_crop"])
+        mode = self._settings["front_crop" if self.front[i] else "rear_crop"]
+        inside = _crop(burst.points, mode, self._rig_from[lidar])
         keep = real & inside
         part = replace(
             burst,
@@ -149,9 +150,15 @@ class Drive:
                 raise CardError("two bursts start at the same time", where=bursts, found=len(again), wanted=0)
 
 
-def _crop(points: npt.NDArray[np.float64], mode: str) -> npt.NDArray[np.bool_]:
+def _crop(
+    points: npt.NDArray[np.float64], mode: str, rig_from_lidar: npt.NDArray[np.float64]
+) -> npt.NDArray[np.bool_]:
     """Points (N, 3) in the sensor frame that lie in the half-space that `mode` keeps."""
     if mode == "none":
         return np.ones(len(points), dtype=np.bool_)
-    forward: npt.NDArray[np.bool_] = points[:, 1] >= 0
-    return forward if mode == "forward" else ~forward
+    if mode == "forward":
+        ahead: npt.NDArray[np.bool_] = points[:, 1] >= 0
+        return ahead
+    # The rear sensor may be mounted either way round: behind means behind in the rig.
+    behind: npt.NDArray[np.bool_] = points @ rig_from_lidar[1, :3] < 0
+    return behind
