@@ -5,7 +5,11 @@
 def raw_bag_fingerprint(wildcards):
     """Fingerprint of all that belongs to the bag: not of labels and trajectories that lie beside it."""
     beside = {"annotations", "privacy_labels.csv", "trajectory.tum"}
-    names = sorted(path.name for path in Path(raw_folder(wildcards)).glob("*") if path.name not in beside)
+    names = sorted(
+        path.name
+        for path in Path(raw_folder(wildcards)).glob("*")
+        if path.name not in beside
+    )
     return raw_fingerprint(*names)(wildcards)
 
 

@@ -4,6 +4,19 @@ REPOSITORIES = {
     terms["repository"]: spdx for spdx, terms in LICENSES["licenses"].items()
 }
 TREE = "results/release/{repository}"
+PACKED = {
+    "frames": ("ingest", "frames"),
+    "bursts": ("ingest", "bursts"),
+    "recording_inventory": ("ingest", "inventory"),
+    "calibration": ("calibration", "calibration"),
+    "poses": ("poses", "poses"),
+    "ground_truth": ("ground_truth", "inventory"),
+    "wheel_excitation": ("wheels", "wheel_excitation"),
+    "road_planes": ("wheels", "road_planes"),
+    "anonymized": ("privacy", "inventory"),
+    "labels": ("annotations", "labels"),
+    "label_states": ("annotations", "label_states"),
+}
 
 
 def license_of(sequence):
@@ -25,15 +38,31 @@ def stages_of(sequence):
 
 
 def package_inputs(wildcards):
-    """Artifacts and reports by name, of the stages that this sequence goes through."""
+    """Artifacts by the names that packaging gives them, and the report of every stage, as far as planned."""
     stages = [
         stage for stage in stages_of(SEQUENCES[wildcards.id]) if stage != "splits"
     ]
-    found = {}
-    for stage in stages:
-        for name, path in getattr(rules, stage).output.items():
-            found[f"{stage}_report" if name == "report" else f"{stage}_{name}"] = path
+    found = {f"{stage}_report": getattr(rules, stage).output.report for stage in stages}
+    for name, (stage, output) in PACKED.items():
+        if stage in stages:
+            found[name] = getattr(getattr(rules, stage).output, output)
     return found
+
+
+def raw_parts(wildcards):
+    """What is released as it was recorded: never an image."""
+    folder, modalities = (
+        Path(recording_folder(wildcards)),
+        SEQUENCES[wildcards.id].modalities,
+    )
+    parts = {
+        "lidar_front": "lidar_front",
+        "lidar_rear": "lidar_rear",
+        "imu": "imu.parquet",
+    }
+    return {
+        name: str(folder / file) for name, file in parts.items() if name in modalities
+    }
 
 
 rule package:
@@ -58,8 +87,7 @@ rule package:
             "modalities",
         ),
         spdx=lambda wildcards: license_of(SEQUENCES[wildcards.id]),
-        recording=recording_folder,
-        stages=lambda wildcards: stages_of(SEQUENCES[wildcards.id]),
+        raw=raw_parts,
         out=subpath(output.inventory, parent=True),
     script:
         "../scripts/package.py"

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from card.artifacts import logged
 from card.annotations.import_labels import import_labels
+from card.artifacts import logged
 
 with logged(Path(snakemake.log[0])):
     import_labels(
