@@ -22,24 +22,31 @@ def badge(counts: Mapping[str, int]) -> str:
 
 
 def quality_table(stages: Mapping[str, Mapping[str, Any]]) -> str:
-    """One row a figure, by stage: value, what it says, its gate and the verdict; then the stages' notes."""
+    """One row a figure, by stage: value, what it says, its gate and the verdict; empty without any."""
     rows = [row for name, stage in stages.items() for row in _stage_rows(name, stage)]
     if not rows:
         return ""
     return (
-        '<table class="quality"><thead><tr><th>stage</th><th>figure</th><th class="n">value</th><th>unit</th>'
-        '<th class="n">gate</th><th>verdict</th></tr></thead><tbody>' + "".join(rows) + "</tbody></table>"
+        '<h3>Quality</h3><div class="wide"><table class="quality"><thead><tr><th>stage</th><th>figure</th><th class="n">value</th><th>unit</th>'
+        '<th class="n">gate</th><th>verdict</th></tr></thead><tbody>'
+        + "".join(rows)
+        + "</tbody></table></div>"
     )
 
 
 def notes_list(stages: Mapping[str, Mapping[str, Any]]) -> str:
     """Remarks of the stages as a list; empty without any."""
     items = [
-        f"<li><b>{escape(name)}</b> {escape(note)}</li>"
+        f"<li><b>{stage_name(name)}</b> {escape(note)}</li>"
         for name, stage in stages.items()
         for note in stage["notes"]
     ]
     return f'<ul class="notes">{"".join(items)}</ul>' if items else ""
+
+
+def stage_name(stage: str) -> str:
+    """A stage as HTML text."""
+    return escape(stage.replace("_", " "))
 
 
 def _stage_rows(name: str, stage: Mapping[str, Any]) -> Iterable[str]:
@@ -53,7 +60,7 @@ def _stage_rows(name: str, stage: Mapping[str, Any]) -> Iterable[str]:
         if gate["figure"] not in known
     ]
     for index, figure in enumerate(figures):
-        first, shown = ("first", escape(name)) if index == 0 else ("", "")
+        first, shown = ("first", stage_name(name)) if index == 0 else ("", "")
         yield (
             f'<tr class="{first}"><td class="stage">{shown}</td>'
             f"<td><b>{escape(figure['name'])}</b><small>{escape(figure['description'])}</small></td>"

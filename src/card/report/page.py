@@ -17,6 +17,16 @@ from card.report.totals import Tree, license_table, read_tree, tiles
 
 TEMPLATE = Path(__file__).with_name("page.html")
 # The package's quality document holds the stages it stands on; these report later.
+CHAIN = (
+    "import_bag",
+    "ingest",
+    "calibration",
+    "poses",
+    "ground_truth",
+    "wheels",
+    "privacy",
+    "annotations",
+)
 LATER_STAGES = {"splits": "splits.report.json", "packaging": "package.report.json"}
 
 
@@ -57,7 +67,9 @@ def page(
 
 
 def _chapter(folder: Path, row: Mapping[str, Any], released: Mapping[str, Any], figures: Path) -> Chapter:
-    stages = dict(read_json(folder / "package" / "sidecars" / "quality.json", "quality")["stages"])
+    stated = read_json(folder / "package" / "sidecars" / "quality.json", "quality")["stages"]
+    known = [stage for stage in CHAIN if stage in stated]
+    stages = {stage: stated[stage] for stage in [*known, *sorted(set(stated) - set(known))]}
     for stage, name in LATER_STAGES.items():
         if (folder / name).is_file():
             stages[stage] = read_json(folder / name, "report")
@@ -103,10 +115,12 @@ def _section(chapter: Chapter) -> str:
     facts = [
         f"{row['place']}, {row['country']}",
         row["road_type"] + (", off-road" if released["off_road"] else ""),
-        f"session {row['session'] or NONE}",
+        f"session {row['session']}" if row["session"] else "no session",
         f"{number(released['frames'])} frames, {number(released['reviewed_frames'])} reviewed",
         f"{released['boxes_positive']} positive and {released['boxes_negative']} negative boxes",
-        f"{_driven(released)} in {duration(seconds)}",
+        duration(seconds)
+        if released["distance_m"] is None
+        else f"{_driven(released)} in {duration(seconds)}",
         released["spdx"],
         released["modalities"].replace(",", ", ").replace("_", " "),
     ]
@@ -115,8 +129,7 @@ def _section(chapter: Chapter) -> str:
             f'<h2 id="{chapter.id}">{chapter.id}</h2>',
             f'<p class="facts">{"".join(f"<span>{escape(fact)}</span>" for fact in facts)}</p>',
             *map(_figure, chapter.figures),
-            "<h3>Quality</h3>",
-            f'<div class="wide">{quality_table(chapter.stages)}</div>',
+            quality_table(chapter.stages),
             notes_list(chapter.stages),
         ]
     )
