@@ -26,11 +26,13 @@ def quality_table(stages: Mapping[str, Mapping[str, Any]]) -> str:
     rows = [row for name, stage in stages.items() for row in _stage_rows(name, stage)]
     if not rows:
         return ""
+    head = (
+        '<th>stage</th><th>figure</th><th class="n">value</th><th>unit</th>'
+        '<th class="n">gate</th><th>verdict</th>'
+    )
     return (
-        '<h3>Quality</h3><div class="wide"><table class="quality"><thead><tr><th>stage</th><th>figure</th><th class="n">value</th><th>unit</th>'
-        '<th class="n">gate</th><th>verdict</th></tr></thead><tbody>'
-        + "".join(rows)
-        + "</tbody></table></div>"
+        f'<h3>Quality</h3><div class="wide"><table class="quality"><thead><tr>{head}</tr></thead>'
+        f"<tbody>{''.join(rows)}</tbody></table></div>"
     )
 
 
