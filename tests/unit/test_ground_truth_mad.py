@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from card.ground_truth.mad import mad_inliers
+from card.ground_truth.thinning import thin
 
 
 def points_at_radii(radii: list[float]) -> np.ndarray:
@@ -44,3 +45,18 @@ def test_equals_a_loop_over_voxels(form, seed):
 
 def test_no_points():
     assert mad_inliers(np.zeros(0, np.int32), np.zeros((0, 3), np.float32), 1.5, "deviation", 2).shape == (0,)
+
+
+@pytest.mark.parametrize("limit", [1, 2, 3, 7])
+def test_thinning_keeps_the_limit_spread_over_each_voxel(limit):
+    voxel = np.random.default_rng(0).integers(0, 30, 300).astype(np.int32)
+    kept = thin(voxel, limit)
+    for v in range(30):
+        own = kept[voxel == v]
+        assert own.sum() == min(limit, len(own))
+        gaps = np.diff(np.flatnonzero(own))
+        assert len(gaps) == 0 or gaps.max() - gaps.min() <= 1
+
+
+def test_a_limit_of_zero_keeps_all():
+    assert thin(np.zeros(9, np.int32), 0).all()

@@ -15,6 +15,7 @@ from card.ground_truth.left_camera import LeftCamera
 from card.ground_truth.mad import mad_inliers
 from card.ground_truth.static_set import StaticSet
 from card.ground_truth.static_window import StaticCloud, seen_by
+from card.ground_truth.thinning import thin
 
 #: The steps in order, and what is left after each; names of counts in coverage and report.
 STEPS = (
@@ -23,6 +24,7 @@ STEPS = (
     "points_two_lidars",
     "points_near_view",
     "points_clean",
+    "points_thinned",
     "points_in_view",
     "points_not_ego",
     "points_pass_1",
@@ -80,6 +82,8 @@ def build_frame(
     )
     kept = kept[clean]
     counts["points_clean"] = len(kept)
+    kept = kept[thin(cloud.voxel[kept], settings["points_per_voxel"])]
+    counts["points_thinned"] = len(kept)
 
     points = corners[cloud.voxel[kept]] + cloud.offset[kept] @ camera_from_world[:3, :3].T
     seen = camera.in_view(points, margin, nearest)
