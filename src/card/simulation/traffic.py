@@ -57,10 +57,10 @@ class Traffic:
         if drive.crossing_s is not None:
             stops = any(speed == 0 for _, speed in drive.speeds)
             # A car that does not stop must find them gone when it gets there.
-            ahead, early = (4.4, 0.0) if stops else (13.0, 1.4)
+            ahead, early = (3.5, 0.0) if stops else (13.0, 1.4)
             look = begin + drive.crossing_s
             for index, late in enumerate((-1.0, 0.4, 1.6)):
-                where = self.course.at(look) + ahead + 0.7 * index
+                where = self.course.at(look) + ahead + 0.6 * index
                 self.cross(where, look + late - early, -1 if index == 1 else 1)
         if drive.walker_spacing:
             first = self.course.at(begin + 1.0) + 5.5
