@@ -67,7 +67,8 @@ def figures(results: Path, truth: Path, sequence: str) -> dict[str, float]:
     coverage = read_table(results / "ground_truth" / "coverage.parquet", "coverage")
     numbers = coverage["frame"].to_pylist()
     scene = _scene(truth / sequence / "world.npz")
-    distances, occluded = [np.empty(0)], [np.empty(0)]
+    distances: list[NDArray[np.float64]] = [np.empty(0)]
+    occluded: list[NDArray[np.bool_]] = [np.empty(0, dtype=np.bool_)]
     for number in numbers[:: max(1, len(numbers) // FRAMES)]:
         file = results / "ground_truth" / f"{number:06d}.npz"
         points = read_arrays(file, "ground_truth_points")["points"].astype(np.float64)

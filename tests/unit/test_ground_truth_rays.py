@@ -4,7 +4,7 @@ from ground_truth_scene import PERIOD_NS, RIG_FROM, START_NS, sweep
 
 from card.estimation.deskew import deskew_burst
 from card.geometry import Trajectory
-from card.ground_truth.rays import POSES, SweepRays
+from card.ground_truth.rays import POSES, SweepRays, pose_times
 
 BOUNDS = {"lateral": 0.06, "nearest": 1.0, "furthest": 50.0, "beyond": 0.1}
 
@@ -24,7 +24,7 @@ def rays_of(lidar: str, trajectory: Trajectory, columns: int) -> tuple[SweepRays
     ]
     burst = sweep(lidar, START_NS, trajectory, columns, boxes)
     points = deskew_burst(burst, RIG_FROM[lidar], trajectory)
-    times = np.linspace(START_NS, START_NS + PERIOD_NS - 1, POSES).astype(np.int64)
+    times = pose_times(START_NS, START_NS + PERIOD_NS - 1)
     poses = trajectory.at(times) @ RIG_FROM[lidar]
     origins = (trajectory.at(burst.time_ns) @ RIG_FROM[lidar])[:, :3, 3]
     return SweepRays(points, burst.time_ns, burst.ring, times, poses), origins, points
@@ -70,3 +70,11 @@ def test_a_pass_says_where_the_return_lies():
     assert passes.along[own] == pytest.approx(half, abs=1e-4)
     assert passes.beyond[own] == pytest.approx(half, abs=1e-4)
     assert passes.gap[own] == pytest.approx(returns[700] - place, abs=1e-4)
+
+
+def test_pose_times_stay_within_the_sweep():
+    # A stamp of today needs 61 bits: through float64 the last time would lie beyond the end.
+    start, end = 1_776_157_200_013_000_001, 1_776_157_200_112_999_999
+    times = pose_times(start, end)
+    assert (times[0], times[-1], len(times)) == (start, end, POSES)
+    assert (np.diff(times) > 0).all()

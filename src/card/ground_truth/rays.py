@@ -38,6 +38,12 @@ class Passes:
     gap: Floats
 
 
+def pose_times(start_ns: int, end_ns: int) -> npt.NDArray[np.int64]:
+    """Times (POSES,) evenly spaced over a sweep, both ends included."""
+    # As offsets: float64 does not resolve nanoseconds since 1970.
+    return start_ns + np.rint(np.linspace(0, end_ns - start_ns, POSES)).astype(np.int64)
+
+
 class SweepRays:
     """The rays of a sweep from where the moving sensor fired them to their returns.
 

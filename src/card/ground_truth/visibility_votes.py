@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from card.ground_truth.rays import POSES, Passes, SweepRays
+from card.ground_truth.rays import Passes, SweepRays, pose_times
 from card.ground_truth.surface import Surface, local_planes
 from card.ground_truth.sweeps import Drive
 from card.ground_truth.voxel_map import VoxelMap
@@ -77,7 +77,7 @@ def visibility_votes(
         hit = find(keys, occupied)
         hit = hit[hit >= 0]
         votes.hits[hit] += 1
-        times = np.linspace(drive.start_ns[i], drive.end_ns[i], POSES).astype(np.int64)
+        times = pose_times(int(drive.start_ns[i]), int(drive.end_ns[i]))
         rays = SweepRays(sweep.points, sweep.time_ns, sweep.ring, times, drive.poses(i, times))
         place = voxels.grid.indices(drive.origins[i : i + 1])[0]
         local = blocks.within(place, settings["pass_max_range_m"] / voxels.grid.size)
