@@ -40,7 +40,7 @@ def write_summary(
     notes = [
         f"{totals[before] - totals[after]} points {_REASONS[after]}"
         for before, after in pairwise(STEPS)
-        if after in _REASONS
+        if after in _REASONS and totals[before] > totals[after]
     ]
     if not why["voxels_not_rigid"]:
         notes.append("the rigidity test rejected no voxel")
