@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from card.geometry import Trajectory, apply, inverse
 from card.simulation.bodies import car, ego_body
 from card.simulation.lidar import (
+    CHANNEL_NS,
     NOISE_M,
     PERIOD_NS,
     REACH_M,
@@ -20,7 +21,8 @@ from card.simulation.lidar import (
 )
 from card.simulation.mesh import Mesh, box, join, mesh
 from card.simulation.raycast import Mover, Scene, Tracer
-from card.simulation.rig import LidarCorrections, nominal_rig
+from card.simulation.rig import CHANNELS, LidarCorrections, nominal_rig
+from card.simulation.scales import scale_named
 from card.simulation.surfaces import Surface
 from card.simulation.world import World, build_world
 
@@ -151,3 +153,10 @@ def test_rear_lidar_sees_the_road_behind(standing: World) -> None:
     near = lane[np.linalg.norm(lane, axis=1) < 30]
     assert near[:, 1].max() < -2
     assert np.allclose(inverse(standing.rig.rig_from["lidar_rear"])[2, 2], np.cos(np.radians(15)))
+
+
+@pytest.mark.parametrize("scale", ["tiny", "demo", "full"])
+def test_a_revolution_ends_before_the_next_one_starts(scale: str) -> None:
+    last_channel_ns = (CHANNELS - 1) * CHANNEL_NS
+    ends = [columns(scale_named(scale).columns, number)[0][-1] + last_channel_ns for number in range(400)]
+    assert max(ends) < PERIOD_NS

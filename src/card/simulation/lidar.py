@@ -46,10 +46,12 @@ def burst_starts(lidar: str, start_ns: int, duration_s: float) -> list[int]:
 def columns(count: int, number: int) -> tuple[NDArray[np.int64], Array]:
     """Firing times (C,) in ns after the burst's start and azimuths (C,) rad of revolution ``number``.
 
-    The first column moves on from one revolution to the next, by whole hundredths of a degree.
+    The first column moves on from one revolution to the next, by whole hundredths of a degree, as far as
+    the last one still fires before the next revolution starts.
     """
     step = _STEP_UNITS // count
-    units = number * 89 % step + step * np.arange(count)
+    firing = -(-(CHANNELS - 1) * CHANNEL_NS * _STEP_UNITS // PERIOD_NS)
+    units = number * 89 % (step - firing) + step * np.arange(count)
     return units * PERIOD_NS // _STEP_UNITS, np.radians(units / 100)
 
 
