@@ -32,7 +32,6 @@ lint: setup
 	ruff format --check .
 	mypy
 	snakefmt --check Snakefile workflow/rules
-	snakemake --lint
 	$(BIN)/python docs/configuration.py --check
 
 format: setup

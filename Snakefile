@@ -14,6 +14,7 @@ configfile: "config/config.yaml"
 
 
 include: "workflow/rules/common.smk"
+include: "workflow/rules/sequences.smk"
 include: "workflow/rules/simulation.smk"
 include: "workflow/rules/ingest.smk"
 include: "workflow/rules/calibration.smk"

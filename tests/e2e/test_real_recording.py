@@ -1,11 +1,12 @@
-"""A LiDAR-only sequence made of a real XT32 recording goes through the chain as far as its modalities reach."""
+"""A LiDAR-only sequence of a real XT32 recording goes through the chain as far as its modalities reach."""
 
 import json
 import shutil
 from pathlib import Path
 
-from card.packaging.reader import Release
 from project import Project
+
+from card.packaging.reader import Release
 
 DESCRIPTION = """
 id: real_xt32
@@ -20,7 +21,7 @@ bag:
   topics: {lidar_front: /pandar_packets}
   channel_angles: {lidar_front: PandarXT32.csv}
 """
-CELLS = "real_xt32 recordings/real_xt32 rosbag2 DE indoor - indoor split false lidar_front -".split()
+CELLS = "real_xt32|recordings/real_xt32|rosbag2|DE|indoor|-|indoor|split|false|lidar_front|-"
 
 
 def test_a_lidar_only_sequence_is_released(fresh: Project, test_data: Path) -> None:
@@ -29,7 +30,7 @@ def test_a_lidar_only_sequence_is_released(fresh: Project, test_data: Path) -> N
     shutil.copy(test_data / "hesai_xt32" / "calibration" / "PandarXT32.csv", recording)
     (recording / "recording.yaml").write_text(DESCRIPTION)
     sheet = fresh.root / "config" / "sequences.tsv"
-    sheet.write_text(sheet.read_text() + "\t".join(CELLS) + "\n")
+    sheet.write_text(sheet.read_text() + CELLS.replace("|", "\t") + "\n")
 
     fresh.build("release", "--config", "sequences=real_xt32")
 
@@ -40,6 +41,6 @@ def test_a_lidar_only_sequence_is_released(fresh: Project, test_data: Path) -> N
 
     release = Release(fresh.root / "results" / "release" / "card-germany")
     assert release.frames() == []
-    # Three whole scans; the cut ends are dropped. The last one is the reference cloud of the vendor's decoder.
+    # Three whole scans; the cut ends are dropped. The last one is the reference of the vendor's decoder.
     clouds = [release.burst("real_xt32", burst) for burst in range(3)]
     assert len(clouds[-1]) == 63_021

@@ -26,7 +26,7 @@ FLOORS: dict[str, set[str]] = {
             "packaging",
         )
     },
-    # They stand on a release or on what the stages left, never on a stage's code; the reader belongs to users.
+    # They stand on a release and on what stages left, never on their code; the reader is for users.
     "benchmark": GROUND | {"packaging.reader"},
     "report": GROUND,
 }

@@ -2,12 +2,6 @@
 # Makes: results/benchmark/{method}/{repository}.json and .md.
 
 
-def predictions(wildcards):
-    return Path(
-        SETTINGS["benchmark"]["methods"][wildcards.method], wildcards.repository
-    )
-
-
 rule evaluate:
     input:
         sums=rules.assemble.output.sums,
@@ -37,22 +31,6 @@ rule evaluate:
         predictions=lambda wildcards: str(predictions(wildcards)),
     script:
         "../scripts/evaluate.py"
-
-
-def evaluations(wildcards):
-    """One table a method and tree that the method has predictions for."""
-    methods = SETTINGS["benchmark"]["methods"]
-    tables = [
-        f"results/benchmark/{method}/{repository}.md"
-        for method, folder in methods.items()
-        for repository in REPOSITORIES
-        if in_tree(repository) and Path(folder, repository).is_dir()
-    ]
-    if not tables:
-        raise WorkflowError(
-            "card: no predictions to evaluate: name them in config.yaml under benchmark.methods"
-        )
-    return tables
 
 
 rule benchmark:

@@ -2,10 +2,6 @@
 # Makes: results/{id}/calibration.json and ego_mask.png.
 
 
-def session_bundle(wildcards):
-    return f"{RAW}/sessions/{SEQUENCES[wildcards.id].session}/calibration.json"
-
-
 rule calibration:
     input:
         bundle=session_bundle,

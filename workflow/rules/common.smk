@@ -1,4 +1,5 @@
-# What every rule file uses: the checked configuration, the sequences to build, fingerprints of code and raw data.
+# The checked configuration, the sequences to build, settings and code of a stage, what a run says.
+import os
 from pathlib import Path
 
 from card.artifacts.code import code_hash
@@ -52,6 +53,8 @@ def check_raw_input(row):
             where=row.id,
             wanted=f"{row.recording}/recording.yaml",
         )
+    if Path(row.recording, "recording.yaml").is_file():
+        check_identity(Path(row.recording), row)
     if row.session and row.session not in simulated["sessions"]:
         folder = Path(RAW, "sessions")
         if not (folder / row.session).is_dir():
@@ -98,44 +101,6 @@ def cfg(stage, *names):
     return {"settings": settings, "gates": gates}
 
 
-def row(*names):
-    """A param function: cells of the sequence's row in the sheet that a stage uses, as a dict of builtins."""
-
-    def of_sequence(wildcards):
-        cells = SEQUENCES[wildcards.id].as_dict()
-        return {name: cells[name] for name in names}
-
-    return of_sequence
-
-
-def raw_folder(wildcards):
-    return SEQUENCES[wildcards.id].recording
-
-
-def recording_folder(wildcards):
-    """Folder in the raw layout: as recorded, or as converted from a bag."""
-    sequence = SEQUENCES[wildcards.id]
-    return (
-        f"results/{sequence.id}/recording"
-        if sequence.format == "rosbag2"
-        else sequence.recording
-    )
-
-
-def raw_fingerprint(*names):
-    """A param function: fingerprint of the named files and folders of a sequence's raw recording."""
-
-    def of_sequence(wildcards):
-        folder, cache = Path(raw_folder(wildcards)), Path(
-            "results", wildcards.id, "fingerprints"
-        )
-        return {
-            name: fingerprint(folder / name, cache / f"{name}.json") for name in names
-        }
-
-    return of_sequence
-
-
 def check_space():
     """Stop before the start where the disk cannot hold what is still to be made."""
     missing = [
@@ -172,27 +137,3 @@ def warn_lost_records():
         print(
             "card: the records of earlier runs are gone: settings changed since then go unseen; --forceall rebuilds"
         )
-
-
-def is_packed(name):
-    return Path("results", name, "package", "inventory.parquet").is_file()
-
-
-def has(sequence, *modalities):
-    return all(name in sequence.modalities for name in modalities)
-
-
-def has_camera(sequence):
-    return any(name in sequence.modalities for name in CAMERAS)
-
-
-def has_poses(sequence):
-    return bool(sequence.session) and has(sequence, "imu")
-
-
-def has_map(sequence):
-    return has_poses(sequence) and has(sequence, "camera_left", *LIDARS)
-
-
-def ids(condition=lambda sequence: True):
-    return [name for name, sequence in SEQUENCES.items() if condition(sequence)]

@@ -2,17 +2,6 @@
 # Makes: results/{id}/frames.parquet, bursts.parquet, inventory.parquet; for a bag also results/{id}/recording/.
 
 
-def raw_bag_fingerprint(wildcards):
-    """Fingerprint of all that belongs to the bag: not of labels and trajectories that lie beside it."""
-    beside = {"annotations", "privacy_labels.csv", "trajectory.tum"}
-    names = sorted(
-        path.name
-        for path in Path(raw_folder(wildcards)).glob("*")
-        if path.name not in beside
-    )
-    return raw_fingerprint(*names)(wildcards)
-
-
 rule import_bag:
     input:
         description=lambda wildcards: f"{raw_folder(wildcards)}/recording.yaml",

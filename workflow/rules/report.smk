@@ -2,15 +2,6 @@
 # Makes: results/report/index.html, a page of maps, overlays and quality figures with their gates.
 
 
-def report_inputs(wildcards):
-    return [
-        path
-        for sequence in SEQUENCES.values()
-        for stage in [*stages_of(sequence), "package"]
-        for path in expand(list(getattr(rules, stage).output), id=sequence.id)
-    ]
-
-
 rule report:
     input:
         artifacts=report_inputs,

@@ -7,11 +7,6 @@ SEED = {"scale": SETTINGS["scale"], "seed": SETTINGS["simulation"]["seed"]}
 TRUTH = SETTINGS["simulation"]["truth"]
 
 
-def one_of(names):
-    # Without a name the rule must match nothing.
-    return "|".join(names) or "(?!)"
-
-
 rule simulate_drive:
     output:
         recording=f"{RAW}/{{drive}}/recording.yaml",
@@ -60,19 +55,3 @@ rule simulate_survey:
         truth=f"{TRUTH}/sessions/{{day}}-leica",
     script:
         "../scripts/simulate_survey.py"
-
-
-def simulated_days():
-    """All that a drive day of the embedded input consists of, whether or not a stage reads it yet."""
-    days = {
-        sequence.session.rsplit("-", 1)[0]
-        for sequence in SEQUENCES.values()
-        if sequence.session
-    }
-    sessions = [
-        name for name in SIMULATED["sessions"] if name.rsplit("-", 1)[0] in days
-    ]
-    surveys = [name for name in SIMULATED["surveys"] if name in days]
-    return expand(rules.simulate_session.output.bundle, simulated=sessions) + expand(
-        rules.simulate_survey.output.board, day=surveys
-    )

@@ -8,10 +8,6 @@ LEDGER = [
 ]
 
 
-def ledger_rows(names):
-    return [line for line in LEDGER if line["sequence"] in names]
-
-
 rule splits:
     input:
         frames=rules.ingest.output.frames,

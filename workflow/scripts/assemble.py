@@ -17,7 +17,7 @@ with logged(Path(snakemake.log[0])):
             {"id": name, "package": Path(package).parent, "splits": splits.get(name)}
             for name, package in zip(snakemake.params.sequences, snakemake.input.packages, strict=True)
         ],
-        release_folder=Path(snakemake.params.templates),
+        release_folder=Path(snakemake.input.changelog).parent,
         schemas=schema_folder(),
         out=Path(snakemake.params.out),
         report=Path(snakemake.output.report),

@@ -14,7 +14,7 @@ PACKAGE = Path(__file__).resolve().parents[1]
 
 
 def code_hash(script: Path) -> str:
-    """Hexadecimal SHA-256 over the syntax trees of ``script`` and its transitive imports from this package."""
+    """Hexadecimal SHA-256 over the syntax trees of a script and of all it imports from this package."""
     digest = hashlib.sha256()
     pending, seen = [script.resolve()], set()
     while pending:

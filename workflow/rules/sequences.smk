@@ -1,0 +1,206 @@
+# What each sequence has, and what it therefore goes into: the functions that the rule files ask.
+
+
+def row(*names):
+    """A param function: cells of the sequence's row in the sheet that a stage uses, as a dict of builtins."""
+
+    def of_sequence(wildcards):
+        cells = SEQUENCES[wildcards.id].as_dict()
+        return {name: cells[name] for name in names}
+
+    return of_sequence
+
+
+def raw_folder(wildcards):
+    return SEQUENCES[wildcards.id].recording
+
+
+def recording_folder(wildcards):
+    """Folder in the raw layout: as recorded, or as converted from a bag."""
+    sequence = SEQUENCES[wildcards.id]
+    return (
+        f"results/{sequence.id}/recording"
+        if sequence.format == "rosbag2"
+        else sequence.recording
+    )
+
+
+def raw_fingerprint(*names):
+    """A param function: fingerprint of the named files and folders of a sequence's raw recording."""
+
+    def of_sequence(wildcards):
+        folder, cache = Path(raw_folder(wildcards)), Path(
+            "results", wildcards.id, "fingerprints"
+        )
+        return {
+            name: fingerprint(folder / name, cache / f"{name}.json") for name in names
+        }
+
+    return of_sequence
+
+
+def has(sequence, *modalities):
+    return all(name in sequence.modalities for name in modalities)
+
+
+def has_camera(sequence):
+    return any(name in sequence.modalities for name in CAMERAS)
+
+
+def has_poses(sequence):
+    return bool(sequence.session) and has(sequence, "imu")
+
+
+def has_map(sequence):
+    return has_poses(sequence) and has(sequence, "camera_left", *LIDARS)
+
+
+def is_packed(name):
+    return Path("results", name, "package", "inventory.parquet").is_file()
+
+
+def ids(condition=lambda sequence: True):
+    return [name for name, sequence in SEQUENCES.items() if condition(sequence)]
+
+
+def one_of(names):
+    # Without a name the rule must match nothing.
+    return "|".join(names) or "(?!)"
+
+
+def simulated_days():
+    """All that a drive day of the embedded input consists of, whether or not a stage reads it yet."""
+    days = {
+        sequence.session.rsplit("-", 1)[0]
+        for sequence in SEQUENCES.values()
+        if sequence.session
+    }
+    sessions = [
+        name for name in SIMULATED["sessions"] if name.rsplit("-", 1)[0] in days
+    ]
+    surveys = [name for name in SIMULATED["surveys"] if name in days]
+    return expand(rules.simulate_session.output.bundle, simulated=sessions) + expand(
+        rules.simulate_survey.output.board, day=surveys
+    )
+
+
+def raw_bag_fingerprint(wildcards):
+    """Fingerprint of all that belongs to the bag: not of labels and trajectories that lie beside it."""
+    beside = {"annotations", "privacy_labels.csv", "trajectory.tum"}
+    names = sorted(
+        path.name
+        for path in Path(raw_folder(wildcards)).glob("*")
+        if path.name not in beside
+    )
+    return raw_fingerprint(*names)(wildcards)
+
+
+def session_bundle(wildcards):
+    return f"{RAW}/sessions/{SEQUENCES[wildcards.id].session}/calibration.json"
+
+
+def ledger_rows(names):
+    return [line for line in LEDGER if line["sequence"] in names]
+
+
+def license_of(sequence):
+    return LICENSES["countries"][sequence.country]
+
+
+def stages_of(sequence):
+    """The stages whose modalities a sequence has."""
+    planned = {
+        "calibration": bool(sequence.session),
+        "poses": has_poses(sequence),
+        "ground_truth": has_map(sequence),
+        "wheels": has_map(sequence),
+        "privacy": has_camera(sequence),
+        "annotations": has(sequence, "camera_left"),
+        "splits": has(sequence, "camera_left"),
+    }
+    return ["ingest", *(stage for stage, wanted in planned.items() if wanted)]
+
+
+def package_inputs(wildcards):
+    """Artifacts by the names that packaging gives them, and the report of every stage, as far as planned."""
+    stages = [
+        stage for stage in stages_of(SEQUENCES[wildcards.id]) if stage != "splits"
+    ]
+    found = {f"{stage}_report": getattr(rules, stage).output.report for stage in stages}
+    for name, (stage, output) in PACKED.items():
+        if stage in stages:
+            found[name] = getattr(getattr(rules, stage).output, output)
+    return found
+
+
+def raw_parts(wildcards):
+    """What is released as it was recorded: never an image."""
+    folder, modalities = (
+        Path(recording_folder(wildcards)),
+        SEQUENCES[wildcards.id].modalities,
+    )
+    parts = {
+        "lidar_front": "lidar_front",
+        "lidar_rear": "lidar_rear",
+        "imu": "imu.parquet",
+    }
+    return {
+        name: str(folder / file) for name, file in parts.items() if name in modalities
+    }
+
+
+def in_tree(repository):
+    spdx = REPOSITORIES[repository]
+    return [sequence for sequence in SEQUENCES.values() if license_of(sequence) == spdx]
+
+
+def tree_packages(wildcards):
+    return expand(
+        rules.package.output.inventory,
+        id=[sequence.id for sequence in in_tree(wildcards.repository)],
+    )
+
+
+def tree_splits(wildcards):
+    chosen = [
+        sequence.id
+        for sequence in in_tree(wildcards.repository)
+        if has(sequence, "camera_left")
+    ]
+    return expand(rules.splits.output.splits, id=chosen)
+
+
+def validations():
+    repositories = [name for name in REPOSITORIES if in_tree(name)]
+    return expand(rules.validate_tree.output.validation, repository=repositories)
+
+
+def report_inputs(wildcards):
+    return [
+        path
+        for sequence in SEQUENCES.values()
+        for stage in [*stages_of(sequence), "package"]
+        for path in expand(list(getattr(rules, stage).output), id=sequence.id)
+    ]
+
+
+def predictions(wildcards):
+    return Path(
+        SETTINGS["benchmark"]["methods"][wildcards.method], wildcards.repository
+    )
+
+
+def evaluations(wildcards):
+    """One table a method and tree that the method has predictions for."""
+    methods = SETTINGS["benchmark"]["methods"]
+    tables = [
+        f"results/benchmark/{method}/{repository}.md"
+        for method, folder in methods.items()
+        for repository in REPOSITORIES
+        if in_tree(repository) and Path(folder, repository).is_dir()
+    ]
+    if not tables:
+        raise WorkflowError(
+            "card: no predictions to evaluate: name them in config.yaml under benchmark.methods"
+        )
+    return tables
