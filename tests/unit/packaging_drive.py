@@ -59,7 +59,7 @@ def write_drive(work: Path, row: dict[str, Any], seed: int = 0) -> dict[str, Any
     results.mkdir(parents=True)
     times = [START_NS + i * STEP_NS for i in range(FRAMES)]
     _write_bursts(recording, results, times, rng)
-    _write_images(results, times, rng)
+    _write_images(recording, results, times, rng)
     _write_ground_truth(results, rng)
     _write_tables(recording, results, times)
     _write_poses(results, times)
@@ -82,7 +82,10 @@ def write_drive(work: Path, row: dict[str, Any], seed: int = 0) -> dict[str, Any
         "anonymized": results / "anonymized",
         "labels": results / "labels.parquet",
         "label_states": results / "label_states.parquet",
-        "reports": {"wheels": write_gated_report(results / "wheels.report.json", row["id"], 0.01)},
+        "reports": {
+            "wheels": write_gated_report(results / "wheels.report.json", row["id"], 0.01),
+            "privacy": write_privacy_report(results / "privacy.report.json", row["id"]),
+        },
         "out": results / "package",
         "report": results / "package.report.json",
         "settings": {name: SETTINGS[name] for name in ("shard_max_bytes", "classes")},
@@ -103,6 +106,12 @@ def write_gated_report(path: Path, sequence: str, residual_m: float, overrides: 
         gates=[{"figure": "residual", "unit": "m", "better": "lower", "threshold": 0.02}],
         overrides=overrides,
     )
+    return path
+
+
+def write_privacy_report(path: Path, sequence: str) -> Path:
+    """Report of a privacy stage without gates."""
+    write_report(path, stage="privacy", sequence=sequence, settings={}, inputs={}, counts={})
     return path
 
 
@@ -169,20 +178,23 @@ def _write_bursts(recording: Path, results: Path, times: list[int], rng: np.rand
     write_table(results / "bursts.parquet", columns, "bursts")
 
 
-def _write_images(results: Path, times: list[int], rng: np.random.Generator) -> None:
+def _write_images(recording: Path, results: Path, times: list[int], rng: np.random.Generator) -> None:
     folder = results / "anonymized"
     rows = []
     for camera in ("camera_left", "camera_right"):
         (folder / camera).mkdir(parents=True)
+        (recording / camera).mkdir()
         for t_ns in times:
             buffer = io.BytesIO()
             pixels = rng.integers(0, 255, (24, 32, 3), dtype=np.uint8)
             Image.fromarray(pixels).save(buffer, "JPEG")
             file = f"{camera}/{t_ns}.jpg"
             (folder / file).write_bytes(buffer.getvalue())
-            rows.append((camera, t_ns, file, 32, 24, 0, 0, sha256_file(folder / file), "test", "1"))
+            (recording / file).write_bytes(b"raw" + buffer.getvalue())
+            hashes = (sha256_file(folder / file), sha256_file(recording / file))
+            rows.append((camera, t_ns, file, 32, 24, 0, 0, *hashes, "test", "1"))
     names = ("camera", "t_ns", "file", "width", "height", "redactions", "redacted_pixels", "sha256",
-             "detector", "detector_version")  # fmt: skip
+             "source_sha256", "detector", "detector_version")  # fmt: skip
     columns = dict(zip(names, map(list, zip(*rows, strict=True)), strict=True))
     write_table(folder / "images.parquet", columns, "images")
     write_table(folder / "inventory.parquet", inventory(folder), "inventory")

@@ -154,7 +154,7 @@ def test_a_changed_burst_is_refused(inputs: dict[str, Any]) -> None:
 def test_a_failed_gate_keeps_the_sequence_out(inputs: dict[str, Any], tmp_path: Path) -> None:
     report = write_gated_report(tmp_path / "wheels.report.json", "de_test", 0.03)
     with pytest.raises(CardError) as error:
-        pack_sequence(**inputs | {"reports": {"wheels": report}})
+        pack_sequence(**inputs | {"reports": inputs["reports"] | {"wheels": report}})
     for part in ("sequence de_test", "stage wheels", "residual = 0.03 m", "<= 0.02 m", "`quarantine`"):
         assert part in str(error.value)
     assert "\n" not in str(error.value)
@@ -164,7 +164,7 @@ def test_a_failed_gate_keeps_the_sequence_out(inputs: dict[str, Any], tmp_path: 
 def test_a_signed_override_lets_it_in_and_is_kept(inputs: dict[str, Any], tmp_path: Path) -> None:
     override = {"figure": "residual", "signed_by": "A. Person", "reason": "gravel"}
     report = write_gated_report(tmp_path / "wheels.report.json", "de_test", 0.03, [override])
-    pack_sequence(**inputs | {"reports": {"wheels": report}})
+    pack_sequence(**inputs | {"reports": inputs["reports"] | {"wheels": report}})
     quality = read_json(inputs["out"] / "sidecars" / "quality.json", "quality")
     assert quality["stages"]["wheels"]["gates"][0]["reason"] == "gravel"
 
@@ -172,7 +172,7 @@ def test_a_signed_override_lets_it_in_and_is_kept(inputs: dict[str, Any], tmp_pa
 def test_a_report_of_another_sequence_is_refused(inputs: dict[str, Any], tmp_path: Path) -> None:
     report = write_gated_report(tmp_path / "wheels.report.json", "it_other", 0.01)
     with pytest.raises(CardError, match=r"report of another sequence \(found it_other"):
-        pack_sequence(**inputs | {"reports": {"wheels": report}})
+        pack_sequence(**inputs | {"reports": inputs["reports"] | {"wheels": report}})
 
 
 def test_a_broken_artifact_leaves_the_old_package(inputs: dict[str, Any]) -> None:
@@ -191,3 +191,42 @@ def test_packed_ground_truth_is_plain_numpy(inputs: dict[str, Any]) -> None:
         assert file is not None
         points = np.load(io.BytesIO(file.read()))["points"]
     assert points.shape == (7, 3)
+
+
+def test_an_image_of_another_raw_image_is_refused(inputs: dict[str, Any]) -> None:
+    raw = inputs["lidar_front"].parent
+    image = sorted((raw / "camera_right").iterdir())[2]
+    image.write_bytes(b"taken again")
+    write_table(inputs["recording_inventory"], inventory(raw), "inventory")
+    with pytest.raises(CardError, match="frame 2, camera_right: image was anonymized from another raw image"):
+        pack_sequence(**inputs)
+    assert not inputs["out"].exists()
+
+
+def test_images_without_a_privacy_report_are_refused(inputs: dict[str, Any]) -> None:
+    del inputs["reports"]["privacy"]
+    with pytest.raises(CardError, match="sequence de_test: images without a report of the privacy stage"):
+        pack_sequence(**inputs)
+
+
+def test_a_report_of_another_stage_is_refused(inputs: dict[str, Any]) -> None:
+    inputs["reports"]["privacy"] = inputs["reports"]["wheels"]
+    with pytest.raises(CardError, match=r"report of another stage \(found wheels, wanted privacy"):
+        pack_sequence(**inputs)
+
+
+def test_an_imu_that_changed_after_ingest_is_refused(inputs: dict[str, Any]) -> None:
+    table = read_table(inputs["imu"], "imu")
+    write_table(inputs["imu"], table.slice(1), "imu")
+    with pytest.raises(CardError, match=r"imu\.parquet: content differs from what ingest recorded"):
+        pack_sequence(**inputs)
+
+
+def test_a_burst_that_ingest_did_not_see_is_named(inputs: dict[str, Any]) -> None:
+    listed = read_table(inputs["recording_inventory"], "inventory")
+    bursts = [name.startswith("lidar_front/") for name in listed["name"].to_pylist()]
+    write_table(inputs["recording_inventory"], listed.filter([not burst for burst in bursts]), "inventory")
+    with pytest.raises(
+        CardError, match=r"lidar_front/\d+\.laz: file is not in the inventory of the recording"
+    ):
+        pack_sequence(**inputs)

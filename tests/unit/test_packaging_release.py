@@ -230,7 +230,7 @@ def test_an_override_is_told_in_card_and_summary(tmp_path: Path) -> None:
     inputs = write_drive(tmp_path, sheet_row())
     override = {"figure": "residual", "signed_by": "A. Person", "reason": "gravel"}
     report = write_gated_report(tmp_path / "wheels.report.json", "de_test", 0.03, [override])
-    pack_sequence(**inputs | {"reports": {"wheels": report}})
+    pack_sequence(**inputs | {"reports": inputs["reports"] | {"wheels": report}})
     splits = write_splits(tmp_path / "splits.parquet", ["unassigned"] * FRAMES, group=None)
     tree = assemble_tree(tmp_path, [{"id": "de_test", "package": inputs["out"], "splits": splits}])
     assert "released because gravel (signed by A. Person)" in (tree / "README.md").read_text()

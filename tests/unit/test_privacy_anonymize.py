@@ -88,6 +88,7 @@ def test_every_image_gets_one_output_and_one_row(drive):
     assert {name for name in bytes_of(out) if name.endswith(".jpg")} == set(names)
     for row in images:
         assert row["sha256"] == hashlib.sha256((out / row["file"]).read_bytes()).hexdigest()
+        assert row["source_sha256"] == hashlib.sha256((drive / row["file"]).read_bytes()).hexdigest()
         assert (row["width"], row["height"]) == (160, 150)
         assert (row["detector"], row["detector_version"]) == ("opencv-haar", cv2.__version__)
 

@@ -38,11 +38,14 @@ def member_name(sequence: str, number: int, modality: str) -> str:
     return f"{sequence}/{number:06d}.{modality}.{EXTENSIONS[modality]}"
 
 
-def image_entries(sequence: str, camera: str, frames: Rows, anonymized: Path) -> list[Entry]:
+def image_entries(
+    sequence: str, camera: str, frames: Rows, anonymized: Path, hashes: Mapping[str, str]
+) -> list[Entry]:
     """Anonymized images of one camera.
 
-    An image gets in only if `anonymized/images.parquet` lists it, and only with the bytes whose hash
-    stands there; any other is a CardError.
+    An image gets in only if `anonymized/images.parquet` lists it, only with the bytes whose hash stands
+    there, and only if it was made from the raw image that ingest saw (`hashes`, by relative name); any
+    other is a CardError.
     """
     listed = {
         (row["camera"], row["t_ns"]): row
@@ -61,6 +64,14 @@ def image_entries(sequence: str, camera: str, frames: Rows, anonymized: Path) ->
                 where=f"sequence {sequence}, frame {row['frame']}, {camera}",
                 found=f"no row for t_ns {t_ns} in {anonymized / 'images.parquet'}",
             )
+        raw = recorded_hash(hashes, row[f"{side}_file"])
+        if image["source_sha256"] != raw:
+            raise CardError(
+                "image was anonymized from another raw image",
+                where=f"sequence {sequence}, frame {row['frame']}, {camera}",
+                found=f"sha256 {image['source_sha256'][:12]}",
+                wanted=f"{raw[:12]}; anonymize the sequence again",
+            )
         name = member_name(sequence, row["frame"], camera)
         entries.append(Entry(Source(name, anonymized / image["file"], image["sha256"]), row["frame"], None))
     return entries
@@ -75,9 +86,18 @@ def burst_entries(
         if row["lidar"] != lidar:
             continue
         path = folder / Path(row["file"]).name
-        source = Source(member_name(sequence, row["burst"], lidar), path, hashes[f"{lidar}/{path.name}"])
+        sha256 = recorded_hash(hashes, f"{lidar}/{path.name}")
+        source = Source(member_name(sequence, row["burst"], lidar), path, sha256)
         entries.append(Entry(source, None, row["burst"]))
     return entries
+
+
+def recorded_hash(hashes: Mapping[str, str], name: str) -> str:
+    """Hash that ingest recorded for a raw file; CardError for a file that it did not see."""
+    try:
+        return hashes[name]
+    except KeyError:
+        raise CardError("file is not in the inventory of the recording", where=name) from None
 
 
 def ground_truth_entries(sequence: str, frames: Rows, folder: Path) -> list[Entry]:

@@ -19,6 +19,7 @@ from card.artifacts import (
     write_report,
     write_table,
 )
+from card.errors import CardError
 from card.packaging.frame_rows import frame_columns
 from card.packaging.modalities import (
     CAMERAS,
@@ -28,6 +29,7 @@ from card.packaging.modalities import (
     ground_truth_entries,
     image_entries,
     label_entries,
+    recorded_hash,
 )
 from card.packaging.quality import gather_quality
 from card.packaging.sequence_row import sequence_document
@@ -72,9 +74,12 @@ def pack_sequence(
     lidar_front, lidar_rear : folders of raw bursts; ground_truth, anonymized : folders of their stages.
     reports : stage -> report of every stage this package stands on.
 
-    CardError for an image that was not anonymized, content that differs from the hash its stage
-    recorded, a failed gate (see `quality`), and artifacts that break their schema.
+    CardError for an image that was not anonymized or from another raw image, images without a privacy
+    report, content that differs from the hash its stage recorded, a failed gate (see `quality`), and
+    artifacts that break their schema.
     """
+    if anonymized and "privacy" not in reports:
+        raise CardError("images without a report of the privacy stage", where=f"sequence {sequence['id']}")
     quality = gather_quality(sequence["id"], reports)
     frame_table = read_table(frames, "frames")
     frame_rows = frame_table.to_pylist()
@@ -84,10 +89,14 @@ def pack_sequence(
     raw = read_table(recording_inventory, "inventory").to_pydict()
     hashes = dict(zip(raw["name"], raw["sha256"], strict=True))
 
+    if imu and sha256_file(imu) != recorded_hash(hashes, "imu.parquet"):
+        raise CardError("content differs from what ingest recorded", where=imu)
+
     entries: dict[str, list[Entry]] = {}
     if anonymized:
         entries |= {
-            camera: image_entries(sequence["id"], camera, frame_rows, anonymized) for camera in CAMERAS
+            camera: image_entries(sequence["id"], camera, frame_rows, anonymized, hashes)
+            for camera in CAMERAS
         }
     burst_rows = read_table(bursts, "bursts").to_pylist()
     for lidar in LIDARS:

@@ -22,6 +22,8 @@ def gather_quality(sequence: str, reports: Mapping[str, Path]) -> dict[str, Any]
             raise CardError(
                 "report of another sequence", where=path, found=report["sequence"], wanted=sequence
             )
+        if report["stage"] != stage:
+            raise CardError("report of another stage", where=path, found=report["stage"], wanted=stage)
         for gate in report["gates"]:
             if gate["verdict"] == "fail":
                 raise _failed(sequence, stage, gate)

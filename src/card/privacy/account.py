@@ -24,7 +24,7 @@ class Job:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What happened to one image: size in pixels, boxes and the areas filled for them, output hash."""
+    """What happened to one image: size in pixels, boxes and the areas filled for them, hashes out and in."""
 
     width: int
     height: int
@@ -32,6 +32,7 @@ class Outcome:
     areas: list[Area]
     redacted_pixels: int
     sha256: str
+    source_sha256: str
 
 
 def image_columns(
@@ -47,6 +48,7 @@ def image_columns(
         "redactions": [len(outcome.areas) for outcome in outcomes],
         "redacted_pixels": [outcome.redacted_pixels for outcome in outcomes],
         "sha256": [outcome.sha256 for outcome in outcomes],
+        "source_sha256": [outcome.source_sha256 for outcome in outcomes],
         "detector": [detector.name] * len(jobs),
         "detector_version": [detector.version] * len(jobs),
     }

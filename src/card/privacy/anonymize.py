@@ -116,9 +116,10 @@ def _start_worker(settings: Mapping[str, Any], scratch: str) -> None:
 def _anonymize_image(job: Job) -> Outcome:
     detector, dilation_px = _worker
     try:
-        content = sanitized(job.source.read_bytes(), job.source)
+        raw = job.source.read_bytes()
     except OSError as error:
         raise CardError("image is missing", where=job.source, found=error.strerror) from error
+    content = sanitized(raw, job.source)
     image: Any = cv2.imdecode(np.frombuffer(content, dtype=np.uint8), cv2.IMREAD_COLOR)
     if image is None:
         raise CardError("unreadable JPEG", where=job.source)
@@ -126,5 +127,5 @@ def _anonymize_image(job: Job) -> Outcome:
     redacted = redact(content, detections, dilation_px=dilation_px, where=job.source)
     job.target.write_bytes(redacted.content)
     height, width = image.shape[:2]
-    digest = sha256(redacted.content).hexdigest()
-    return Outcome(width, height, detections, redacted.areas, redacted.pixels, digest)
+    hashes = sha256(redacted.content).hexdigest(), sha256(raw).hexdigest()
+    return Outcome(width, height, detections, redacted.areas, redacted.pixels, *hashes)
