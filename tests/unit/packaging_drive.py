@@ -84,7 +84,10 @@ def write_drive(work: Path, row: dict[str, Any], seed: int = 0) -> dict[str, Any
         "label_states": results / "label_states.parquet",
         "reports": {
             "wheels": write_gated_report(results / "wheels.report.json", row["id"], 0.01),
-            "privacy": write_privacy_report(results / "privacy.report.json", row["id"]),
+            **{
+                stage: write_plain_report(results / f"{stage}.report.json", stage, row["id"])
+                for stage in ("calibration", "poses", "privacy")
+            },
         },
         "out": results / "package",
         "report": results / "package.report.json",
@@ -109,9 +112,9 @@ def write_gated_report(path: Path, sequence: str, residual_m: float, overrides: 
     return path
 
 
-def write_privacy_report(path: Path, sequence: str) -> Path:
-    """Report of a privacy stage without gates."""
-    write_report(path, stage="privacy", sequence=sequence, settings={}, inputs={}, counts={})
+def write_plain_report(path: Path, stage: str, sequence: str) -> Path:
+    """Report of a stage without gates."""
+    write_report(path, stage=stage, sequence=sequence, settings={}, inputs={}, counts={})
     return path
 
 

@@ -129,6 +129,35 @@ def with_exif(jpeg: bytes) -> bytes:
     return jpeg[:2] + b"\xff\xe1" + jpeg[4:]
 
 
+def behind(path: str, content: bytes) -> Corruption:
+    """Append to a file."""
+
+    def corrupt(tree: Path) -> None:
+        with (tree / path).open("ab") as file:
+            file.write(content)
+
+    return corrupt
+
+
+def hidden_before(path: str) -> Corruption:
+    """Another file under the first member's name before it, and an index that passes it by."""
+
+    def corrupt(tree: Path) -> None:
+        content = (tree / path).read_bytes()
+        (tree / path).write_bytes(content[:512] + b"raw".ljust(-(-_size(content) // 512) * 512) + content)
+        table = pq.read_table(tree / MEMBERS)
+        shift = (tree / path).stat().st_size - len(content)
+        for index, row in enumerate(table.to_pylist()):
+            if row["shard"] == path:
+                cell(MEMBERS, "offset", index, row["offset"] + shift)(tree)
+
+    return corrupt
+
+
+def _size(tar: bytes) -> int:
+    return int(tar[124:135], 8)
+
+
 def label(line: bytes) -> Callable[[bytes], bytes]:
     return lambda content: line.ljust(len(content) - 1)[: len(content) - 1] + b"\n"
 

@@ -1,5 +1,6 @@
 """Each seeded fault of a release tree is found, by the check that is there for it."""
 
+import json
 import re
 import shutil
 from pathlib import Path
@@ -11,11 +12,13 @@ from packaging_drive import SETTINGS, build_tree
 from packaging_faults import (
     MEMBERS,
     Corruption,
+    behind,
     cell,
     copy,
     field,
     first_twice,
     flip,
+    hidden_before,
     label,
     member,
     remove,
@@ -42,6 +45,18 @@ LEDGER = [
 TRAIN, UNASSIGNED = "metadata/frames-train.parquet", "metadata/frames-unassigned.parquet"
 SEQUENCES = "metadata/sequences.parquet"
 SIDECARS = "sequences/de_test"
+
+
+def without_stage(tree: Path, stage: str) -> None:
+    path = tree / SIDECARS / "quality.json"
+    document = json.loads(path.read_text())
+    del document["stages"][stage]
+    path.write_text(json.dumps(document))
+
+
+def thumbnail(tree: Path) -> bytes:
+    image: bytes = pq.read_table(tree / "mini" / "mini.parquet")["image"][0].as_py()
+    return image
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +91,23 @@ SEALED: dict[str, tuple[Corruption, str]] = {
     "a lost split file": (remove("metadata/frames-test.parquet"), r"frames-test\.parquet: missing"),
     "a lost shard": (remove("data/de_test/labels-000.tar"), r"labels-000\.tar: missing, but"),
     "a lost sidecar": (remove(f"{SIDECARS}/provenance.json"), r"provenance\.json: file is missing"),
-    "lost poses": (remove(f"{SIDECARS}/poses.json"), r"poses\.json: missing, though"),
+    "lost poses": (remove(f"{SIDECARS}/poses.json"), r"poses\.json: missing, though .* reports on poses"),
+    "lost wheels": (
+        remove(f"{SIDECARS}/wheel_excitation.json"),
+        r"wheel_excitation\.json: missing, though .* reports on wheels",
+    ),
+    "images that privacy does not answer for": (
+        lambda tree: without_stage(tree, "privacy"),
+        r"quality\.json: images without a report of the privacy stage",
+    ),
+    "bytes behind a shard": (
+        behind("data/de_test/camera_left-000.tar", b"raw image".ljust(512)),
+        r"camera_left-000\.tar: holds bytes that belong to no member",
+    ),
+    "a file hidden under the name of another": (
+        hidden_before("data/de_test/camera_left-000.tar"),
+        r"camera_left-000\.tar: holds bytes that belong to no member",
+    ),
     "a shard nobody refers to": (
         copy("data/de_test/labels-000.tar", "data/de_test/labels-001.tar"),
         r"labels-001\.tar: no member lies in it",
@@ -148,6 +179,26 @@ SEALED: dict[str, tuple[Corruption, str]] = {
         r"camera_left-000\.tar: not a readable tar",
     ),
     "EXIF in an image": (member("camera_left", with_exif), r"carries EXIF"),
+    "ICC or a second image's index": (
+        member("camera_left", lambda jpeg: jpeg[:2] + b"\xff\xe2" + jpeg[4:]),
+        r"carries a segment ff e2",
+    ),
+    "an image behind the image": (
+        member("camera_left", lambda jpeg: jpeg[:-40] + b"\xff\xd9" + jpeg[-38:]),
+        r"has bytes that are not of its image",
+    ),
+    "a thumbnail of no frame": (
+        cell("mini/mini.parquet", "frame", 0, 77),
+        r"mini\.parquet: .*77 is no frame",
+    ),
+    "a thumbnail in another split": (
+        cell("mini/mini.parquet", "split", 0, "test"),
+        r"mini\.parquet: .*has another split",
+    ),
+    "EXIF in a thumbnail": (
+        lambda tree: cell("mini/mini.parquet", "image", 0, with_exif(thumbnail(tree)))(tree),
+        r"mini\.parquet: .*carries EXIF",
+    ),
     "an image cut short": (
         member("camera_right", lambda jpeg: jpeg[:-2] + b"\0\0"),
         r"is not one whole JPEG",
@@ -155,6 +206,10 @@ SEALED: dict[str, tuple[Corruption, str]] = {
     "a scan that is no LAZ": (member("lidar_front", lambda laz: b"X" + laz[1:]), r"is not LAZ"),
     "ground truth that is no npz": (
         member("ground_truth", lambda npz: bytes(len(npz))),
+        r"is not an npz with points",
+    ),
+    "ground truth that is half a zip": (
+        member("ground_truth", lambda npz: b"PK\x03\x04" + bytes(len(npz) - 4)),
         r"is not an npz with points",
     ),
     "a label outside": (

@@ -71,6 +71,11 @@ def write_shards(sources: Iterable[Source], folder: Path, stem: str, max_bytes: 
     return members
 
 
+def shard_bytes(sizes: Iterable[int]) -> int:
+    """Bytes of a shard that holds just files of these sizes."""
+    return sum(BLOCK + _padded(size) for size in sizes) + 2 * BLOCK
+
+
 def _size(source: Source) -> int:
     if isinstance(source.content, bytes):
         return len(source.content)

@@ -7,6 +7,7 @@ from typing import Any
 from card.packaging.checks.contents import Contents
 
 TOLERANCE = 1e-6
+MADE = {"calibration": "calibration.json", "poses": "poses.json", "wheels": "wheel_excitation.json"}
 
 
 def check_geometry(contents: Contents) -> Iterator[str]:
@@ -22,11 +23,10 @@ def check_geometry(contents: Contents) -> Iterator[str]:
         if poses := sidecars.get("poses.json"):
             for problem in _poses(poses["poses"], numbers.get(sequence, {})):
                 yield f"{where}/poses.json: {problem}"
-        modalities = next((r["modalities"] for r in contents.sequences if r["sequence"] == sequence), "")
-        if "camera_left" in modalities.split(","):
-            for name in ("calibration.json", "poses.json"):
-                if name not in sidecars and not (contents.tree / where / name).exists():
-                    yield f"{where}/{name}: missing, though the sequence has images"
+        reported = sidecars.get("quality.json", {"stages": {}})["stages"]
+        for stage, name in MADE.items():
+            if stage in reported and not (contents.tree / where / name).exists():
+                yield f"{where}/{name}: missing, though quality.json reports on {stage}"
 
 
 def _calibration(calibration: Any) -> Iterator[str]:

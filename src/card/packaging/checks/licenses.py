@@ -1,10 +1,11 @@
-"""One tree, one licence; and nothing in it that failed a gate."""
+"""One tree, one licence; and nothing in it that failed a gate or that privacy does not answer for."""
 
 from collections.abc import Iterator
 
 import yaml
 
 from card.packaging.checks.contents import Contents
+from card.packaging.modalities import CAMERAS
 
 
 def check_licenses(contents: Contents) -> Iterator[str]:
@@ -19,11 +20,15 @@ def check_licenses(contents: Contents) -> Iterator[str]:
         for row in table:
             if row["spdx"] != spdx:
                 yield f"{path}: a row of {row['sequence']} is under {row['spdx']}, the tree under {spdx}"
+    with_images = {row["sequence"] for row in contents.members if row["modality"] in CAMERAS}
     for sequence, sidecars in contents.sidecars.items():
         stated = sidecars.get("provenance.json", {"spdx": spdx})["spdx"]
         if stated != spdx:
             yield f"sequences/{sequence}/provenance.json: under {stated}, the tree under {spdx}"
-        for stage, quality in sidecars.get("quality.json", {"stages": {}})["stages"].items():
+        stages = sidecars.get("quality.json", {"stages": {}})["stages"]
+        if "privacy" not in stages and sequence in with_images:
+            yield f"sequences/{sequence}/quality.json: images without a report of the privacy stage"
+        for stage, quality in stages.items():
             for gate in quality["gates"]:
                 if gate["verdict"] == "fail":
                     yield f"sequences/{sequence}/quality.json: gate {gate['figure']} of {stage} failed"

@@ -3,6 +3,8 @@
 import hashlib
 import io
 import tarfile
+import zipfile
+import zlib
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,9 +12,9 @@ from typing import Any
 
 from card.artifacts import progress
 from card.packaging.checks.contents import Contents, Row
+from card.packaging.checks.jpeg import jpeg_problems
 from card.packaging.modalities import member_name
-
-JPEG_METADATA = {b"\xff\xe1": "EXIF or XMP", b"\xff\xed": "IPTC", b"\xff\xfe": "a comment"}
+from card.packaging.shards import shard_bytes
 
 
 def check_members(contents: Contents) -> Iterator[str]:
@@ -46,6 +48,9 @@ def _check_shard(
         return
     for name in sorted(set(packed) - {row["file"] for row in rows}):
         yield f"{shard}: {name} is packed but not in the member table"
+    # Two members may share a name, and a tar may go on behind its end: neither shows in the names.
+    if path.stat().st_size != shard_bytes(row["size"] for row in rows):
+        yield f"{shard}: holds bytes that belong to no member of the member table"
     with path.open("rb") as file:
         for row in rows:
             if packed.get(row["file"]) != (row["offset"], row["size"]):
@@ -62,14 +67,7 @@ def _check_shard(
 
 
 def _image(content: bytes, frame: Row) -> Iterator[str]:
-    if not content.startswith(b"\xff\xd8") or not content.endswith(b"\xff\xd9"):
-        yield "is not one whole JPEG"
-        return
-    position = 2
-    while content[position : position + 1] == b"\xff" and content[position + 1] != 0xDA:
-        if name := JPEG_METADATA.get(content[position : position + 2]):
-            yield f"carries {name}, which can identify people"
-        position += 2 + int.from_bytes(content[position + 2 : position + 4], "big")
+    yield from jpeg_problems(content)
 
 
 def _lidar(content: bytes, frame: Row) -> Iterator[str]:
@@ -83,7 +81,7 @@ def _ground_truth(content: bytes, frame: Row) -> Iterator[str]:
     try:
         with np.load(io.BytesIO(content), allow_pickle=False) as archive:
             points: Any = archive["points"]
-    except (ValueError, OSError, KeyError) as error:
+    except (ValueError, OSError, EOFError, KeyError, zipfile.BadZipFile, zlib.error) as error:
         yield f"is not an npz with points ({error})"
         return
     if points.dtype != np.float32 or points.ndim != 2 or points.shape[1] != 3:

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 from card.packaging.checks.contents import Contents, Row
+from card.packaging.checks.jpeg import jpeg_problems
 from card.packaging.modalities import LIDARS
 
 PER_FRAME = ("camera_left", "camera_right", "ground_truth", "labels")
@@ -15,6 +16,7 @@ def check_tables(contents: Contents) -> Iterator[str]:
     yield from _check_frames(contents)
     yield from _check_sequences(contents)
     yield from _check_release(contents)
+    yield from _check_mini(contents)
 
 
 def _check_frames(contents: Contents) -> Iterator[str]:
@@ -100,6 +102,18 @@ def _check_release(contents: Contents) -> Iterator[str]:
         sum(r["size"] for r in contents.members),
     ):
         yield "release.json: files or bytes are not those of metadata/members.parquet"
+
+
+def _check_mini(contents: Contents) -> Iterator[str]:
+    splits = {(row["sequence"], row["frame"]): row["split"] for row in contents.all_frames()}
+    for row in contents.mini:
+        split = splits.get((row["sequence"], row["frame"]))
+        if split is None:
+            yield f"mini/mini.parquet: {_name(row)} is no frame of the tree"
+        elif split != row["split"]:
+            yield f"mini/mini.parquet: {_name(row)} has another split than its frame"
+        for problem in jpeg_problems(row["image"]):
+            yield f"mini/mini.parquet: {_name(row)} {problem}"
 
 
 def _name(row: Row) -> str:
