@@ -19,6 +19,7 @@ def deskew_burst(
     corrections: Mapping[str, Any] | None = None,
     *,
     motion_compensate: bool = True,
+    end_ns: int | None = None,
 ) -> NDArray[np.float64]:
     """World points (N, 3) float64, metres, of a burst's points (N, 3) in the sensor frame.
 
@@ -30,23 +31,25 @@ def deskew_burst(
     rig_from_lidar : (4, 4) extrinsic of the sensor.
     corrections : the sensor's entry of ``lidar_corrections`` in the calibration, if any.
     motion_compensate : False for a recording that is deskewed to the burst's end already.
+    end_ns : end of the whole burst, where `burst` holds only some of its points; else that of its last point.
 
     Raises
     ------
     CardError
         If the trajectory does not cover the burst.
     """
-    if burst.t_ns < trajectory.start_ns or burst.end_ns > trajectory.end_ns:
+    end = burst.end_ns if end_ns is None else end_ns
+    if burst.t_ns < trajectory.start_ns or end > trajectory.end_ns:
         raise CardError(
             "poses do not cover the burst",
             where=f"burst {burst.t_ns}",
             found=f"poses {trajectory.start_ns}..{trajectory.end_ns} ns",
-            wanted=f"{burst.t_ns}..{burst.end_ns} ns",
+            wanted=f"{burst.t_ns}..{end} ns",
         )
     points = burst.points if corrections is None else correct_points(burst.points, burst.ring, corrections)
     points_rig = apply(rig_from_lidar, points)
     if not motion_compensate:
-        return apply(trajectory.at(burst.end_ns), points_rig)
+        return apply(trajectory.at(end), points_rig)
     # The channels of one column fire within microseconds and share times: interpolate each time once.
     times, inverse = np.unique(burst.time_ns, return_inverse=True)
     return apply(trajectory.at(times)[inverse], points_rig)

@@ -91,11 +91,17 @@ def _static_points(
         lidar = lidars[entry.lidar]
         arcs = [float(path.arc_at(entry.t_start_ns)) for path in paths]
         windows = [(arc - arc_window_m, arc + arc_window_m) for arc in arcs]
-        burst = crop_burst(read_burst(entry.file), lidar.rig_from_lidar, trajectory, paths, windows)
+        whole = read_burst(entry.file)
+        burst = crop_burst(whole, lidar.rig_from_lidar, trajectory, paths, windows)
         if len(burst) == 0:
             continue
         points = deskew_burst(
-            burst, lidar.rig_from_lidar, trajectory, lidar.corrections, motion_compensate=not lidar.deskewed
+            burst,
+            lidar.rig_from_lidar,
+            trajectory,
+            lidar.corrections,
+            motion_compensate=not lidar.deskewed,
+            end_ns=whole.end_ns,
         )
         points = points[static.near(points, static_reach)]
         if len(points):
