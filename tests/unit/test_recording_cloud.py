@@ -95,3 +95,14 @@ def test_returns_that_are_none_are_left_out() -> None:
 def test_clouds_that_lack_something_are_refused(fields: dict[str, tuple[str, Any]], message: str) -> None:
     with pytest.raises(CardError, match=message):
         points_of_cloud(cloud(fields), "test")
+
+
+@pytest.mark.parametrize("start", [0.0, STAMP_NS / 1e9])
+def test_a_return_without_a_time_is_refused_and_one_that_is_none_is_not(start: float) -> None:
+    times = start + np.array([0.0, np.nan, 0.09])
+    with pytest.raises(CardError, match=r"points without a time \(found 1\)"):
+        points_of_cloud(cloud(basic(time=("f8", times))), "test")
+    lost = {axis: ("f4", [1.0, np.nan, 3.0]) for axis in "xyz"}
+    points = points_of_cloud(cloud(basic(time=("f8", times)) | lost, dense=False), "test")
+    assert points.ring.tolist() == [0, 31]
+    np.testing.assert_allclose(points.time_ns - STAMP_NS, [0, 90_000_000], atol=500)

@@ -45,7 +45,10 @@ def points_of_cloud(cloud: Any, where: object) -> Points:
             "points that are not finite in a dense cloud", where=where, found=int((~finite).sum())
         )
     keep = finite & points.any(axis=1)
-    time_ns = _time_ns(table[time_name], nanoseconds(cloud.header.stamp))[keep]
+    times = table[time_name][keep]
+    if not np.isfinite(times).all():
+        raise CardError("points without a time", where=where, found=int((~np.isfinite(times)).sum()))
+    time_ns = _time_ns(times, nanoseconds(cloud.header.stamp))
     order = np.argsort(time_ns, kind="stable")
     return Points(
         points=points[keep][order],
@@ -86,13 +89,11 @@ def _time_ns(values: npt.NDArray[Any], stamp_ns: int) -> npt.NDArray[np.int64]:
     if values.dtype.kind in "iu":
         return stamp_ns + values.astype(np.int64)
     seconds = values.astype(np.float64)
-    if np.nanmax(seconds, initial=0.0) < _ABSOLUTE_FROM_S:
-        return stamp_ns + np.rint(np.nan_to_num(seconds) * 1e9).astype(np.int64)
+    if np.max(seconds, initial=0.0) < _ABSOLUTE_FROM_S:
+        return stamp_ns + np.rint(seconds * 1e9).astype(np.int64)
     # Whole seconds apart: their product with 1e9 does not fit a float64.
-    whole = np.floor(np.nan_to_num(seconds))
-    return whole.astype(np.int64) * 1_000_000_000 + np.rint((np.nan_to_num(seconds) - whole) * 1e9).astype(
-        np.int64
-    )
+    whole = np.floor(seconds)
+    return whole.astype(np.int64) * 1_000_000_000 + np.rint((seconds - whole) * 1e9).astype(np.int64)
 
 
 def _byte(values: npt.NDArray[Any], what: str, where: object) -> npt.NDArray[np.uint8]:
