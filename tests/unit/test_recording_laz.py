@@ -65,6 +65,10 @@ def test_bad_bursts_are_not_written(tmp_path: Path) -> None:
     for bad, message in (
         (Burst(START_NS, nan, good.intensity, good.ring, good.offset_ns), "not finite.*first is point 17"),
         (Burst(START_NS, good.points, good.intensity, good.ring, late), "point times outside the burst"),
+        (
+            Burst(START_NS, good.points, good.intensity, good.ring + np.uint8(1), good.offset_ns),
+            "ring.*found 32",
+        ),
         (Burst(START_NS, good.points, good.intensity[:-1], good.ring, good.offset_ns), "differ in length"),
         (Burst(5, good.points, good.intensity, good.ring, good.offset_ns), "under another time"),
     ):

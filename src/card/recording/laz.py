@@ -11,6 +11,7 @@ import numpy as np
 
 from card.errors import CardError
 from card.recording.burst import MAX_BURST_NS, Burst
+from card.recording.hesai.packet import CHANNELS
 from card.recording.paths import stamp_of
 
 #: Metres a unit; the sensor's own unit is 4 mm, its noise some mm.
@@ -48,7 +49,7 @@ def read_burst(path: Path) -> Burst:
     """Read the burst at <t_ns>.laz; its start comes from the name.
 
     Raises CardError, naming the file, for a file that is missing or no LAZ, lacks a dimension,
-    or has points that are not finite or times that are not within one burst.
+    or has points that are not finite, unknown rings or times that are not within one burst.
     """
     t_ns = stamp_of(path)
     try:
@@ -93,6 +94,13 @@ def _check(burst: Burst, path: Path) -> None:
     if len(bad):
         raise CardError(
             "points that are not finite", where=path, found=f"{len(bad)} of {count}, first is point {bad[0]}"
+        )
+    if count and burst.ring.max() >= CHANNELS:
+        raise CardError(
+            "ring that the sensor does not have",
+            where=path,
+            found=int(burst.ring.max()),
+            wanted=f"0 to {CHANNELS - 1}, 0 at the top",
         )
     late = np.flatnonzero(burst.offset_ns > MAX_BURST_NS)
     if len(late):
