@@ -267,3 +267,39 @@ def test_every_schema_is_closed_and_described(name: str) -> None:
         Draft202012Validator.check_schema(schema)
         if name.startswith("settings/"):
             assert all("default" in f or "properties" in f for f in schema["properties"].values())
+
+
+@pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity", "1e999"])
+def test_a_document_with_a_number_that_json_lacks_is_refused(tmp_path: Path, number: str) -> None:
+    path = tmp_path / "r.json"
+    report(path, 1.0)
+    path.write_text(path.read_text().replace('"value": 1.0', f'"value": {number}'))
+    with pytest.raises(CardError, match=r"r\.json: number is not finite"):
+        read_json(path, "report")
+
+
+@pytest.mark.parametrize("damage", ["emptied", "deflate"])
+def test_a_damaged_npz_is_named(tmp_path: Path, damage: str) -> None:
+    path = tmp_path / "v.npz"
+    write_arrays(path, voxels(), "static_voxels")
+    content = bytearray(path.read_bytes())
+    content[60:90] = b"\xff" * 30
+    path.write_bytes(content if damage == "deflate" else b"")
+    with pytest.raises(CardError, match=r"v\.npz: unreadable npz"):
+        read_arrays(path, "static_voxels")
+
+
+def test_a_gate_in_another_unit_than_its_figure_is_refused(tmp_path: Path) -> None:
+    gate = {"figure": "residual", "unit": "mm", "better": "lower", "threshold": 20}
+    with pytest.raises(
+        CardError, match=r"gate on residual has another unit than the figure \(found mm, wanted m\)"
+    ):
+        write_report(
+            tmp_path / "r.json",
+            stage="wheels",
+            settings={},
+            inputs={},
+            counts={},
+            figures=[Figure("residual", 0.5, "m", "Residual")],
+            gates=[gate],
+        )

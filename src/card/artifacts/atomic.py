@@ -71,4 +71,8 @@ def _restore(path: Path, old: Path) -> None:
 
 
 def _cannot_write(path: Path, error: OSError) -> CardError:
-    return CardError("cannot write artifact", where=path, found=error.strerror or str(error))
+    found = error.strerror or str(error)
+    # What could not be read or written may be another file than the artifact.
+    if error.filename is not None and ".partial" not in str(error.filename):
+        found += f": {error.filename}"
+    return CardError("cannot write artifact", where=path, found=found)

@@ -22,9 +22,15 @@ def write_json(path: Path, document: Any, schema: str) -> None:
 
 
 def read_json(path: Path, schema: str) -> Any:
-    """Read a document and check it against ``schema``."""
+    """Read a document and check it against ``schema``; NaN and infinities are refused as when writing."""
+
+    def finite(number: str) -> float:
+        if not math.isfinite(value := float(number)):
+            raise CardError("number is not finite", where=path, found=number)
+        return value
+
     try:
-        document = json.loads(_text(path))
+        document = json.loads(_text(path), parse_float=finite, parse_constant=finite)
     except json.JSONDecodeError as error:
         raise CardError("not JSON", where=f"{path}:{error.lineno}", found=error.msg) from error
     check(document, schema, path)

@@ -9,6 +9,7 @@ from typing import Any
 
 from card.artifacts.documents import write_json
 from card.artifacts.hashing import sha256_file
+from card.errors import CardError
 
 # Libraries whose version can change an artifact's bytes.
 LIBRARIES = (
@@ -54,7 +55,21 @@ def write_report(
     inputs : name to the file whose hash is recorded.
     gates : ``{figure, unit, better, threshold}`` each; a figure that is missing fails its gate.
     overrides : ``{figure, signed_by, reason}`` each; a failed gate named here is ``overridden``.
+
+    Raises
+    ------
+    CardError
+        For a gate in another unit than its figure, which would compare what cannot be compared.
     """
+    units = {figure.name: figure.unit for figure in figures}
+    for gate in gates:
+        if units.get(gate["figure"], gate["unit"]) != gate["unit"]:
+            raise CardError(
+                f"gate on {gate['figure']} has another unit than the figure",
+                where=f"stage {stage}",
+                found=gate["unit"],
+                wanted=units[gate["figure"]],
+            )
     values = {figure.name: figure.value for figure in figures}
     document = {
         "schema": "report",
