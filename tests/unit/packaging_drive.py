@@ -140,9 +140,11 @@ def build_tree(work: Path, name: str = "de_test", splits: list[str] | None = Non
     return assemble_tree(work, [{"id": name, "package": inputs["out"], "splits": table}])
 
 
-def assemble_tree(work: Path, sequences: list[dict[str, Any]], spdx: str = "CC-BY-4.0") -> Path:
+def assemble_tree(
+    work: Path, sequences: list[dict[str, Any]], spdx: str = "CC-BY-4.0", terms: Any = None
+) -> Path:
     """Assemble packages into a tree with the repository's own templates."""
-    terms = LICENSES["licenses"][spdx]
+    terms = terms or LICENSES["licenses"][spdx]
     out = work / "results" / "release" / terms["repository"]
     assemble(
         repository=terms["repository"],

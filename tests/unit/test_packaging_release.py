@@ -13,6 +13,7 @@ import pytest
 import yaml
 from packaging_drive import (
     FRAMES,
+    LICENSES,
     SETTINGS,
     assemble_tree,
     build_tree,
@@ -245,6 +246,21 @@ def test_validation_writes_its_report_and_the_summary_says_so(tree: Path, tmp_pa
     validate(tree, report=report, settings=SETTINGS)
     assert read_json(report, "report")["counts"]["findings"] == 0
     assert "card-germany (CC-BY-4.0): 1 sequences, 6 frames, 34 files" in summarize(tree.parent)
+
+
+def test_a_validation_of_an_older_tree_does_not_count(tmp_path: Path) -> None:
+    tree = build_tree(tmp_path)
+    validate(tree, report=tree.with_name(f"{tree.name}.validation.json"), settings=SETTINGS)
+    assert "NOT VALIDATED" not in summarize(tree.parent)
+    with (tree / "SHA256SUMS").open("a") as sums:
+        sums.write("\n")
+    assert "NOT VALIDATED" in summarize(tree.parent)
+
+
+def test_a_missing_template_is_named(tmp_path: Path) -> None:
+    terms = LICENSES["licenses"]["CC-BY-4.0"] | {"text": "absent.txt"}
+    with pytest.raises(CardError, match=r"No such file or directory.*absent\.txt"):
+        assemble_tree(tmp_path, [], terms=terms)
 
 
 def test_summary_of_nothing(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from card.artifacts import read_json, read_table
+from card.artifacts import read_json, read_table, sha256_file
 
 UNITS = ((1e9, "GB"), (1e6, "MB"), (1e3, "kB"))
 
@@ -13,7 +13,7 @@ UNITS = ((1e9, "GB"), (1e6, "MB"), (1e3, "kB"))
 def summarize(release: Path) -> str:
     """Text on all trees under the folder `release`.
 
-    A tree that stands there without its validation report is called so.
+    A tree without the validation report of just its checksums is called so.
     """
     trees = sorted(path.parent for path in release.glob("*/release.json"))
     if not trees:
@@ -22,8 +22,8 @@ def summarize(release: Path) -> str:
     lines = [
         f"{document['repository']} ({document['spdx']}): {len(document['sequences'])} sequences, "
         f"{sum(document['frames'].values())} frames, {document['files']} files, {_bytes(document['bytes'])}, "
-        + ("valid" if (release / f"{document['repository']}.validation.json").is_file() else "NOT VALIDATED")
-        for document in documents
+        + ("valid" if _is_validated(tree) else "NOT VALIDATED")
+        for tree, document in zip(trees, documents, strict=True)
     ]
     verdicts: Counter[str] = Counter()
     for tree in trees:
@@ -43,6 +43,14 @@ def summarize(release: Path) -> str:
         )
     lines.append("look at: " + ", ".join(str(tree / "README.md") for tree in trees))
     return "\n".join(lines)
+
+
+def _is_validated(tree: Path) -> bool:
+    report, sums = tree.with_name(f"{tree.name}.validation.json"), tree / "SHA256SUMS"
+    if not (report.is_file() and sums.is_file()):
+        return False
+    stated: str | None = read_json(report, "report")["inputs"].get("checksums")
+    return stated == sha256_file(sums)
 
 
 def _gates(tree: Path) -> list[Any]:
