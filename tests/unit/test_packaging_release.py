@@ -257,6 +257,11 @@ def test_a_validation_of_an_older_tree_does_not_count(tmp_path: Path) -> None:
     assert "NOT VALIDATED" in summarize(tree.parent)
 
 
+def test_the_card_shows_a_split_that_can_be_loaded(tmp_path: Path) -> None:
+    tree = build_tree(tmp_path, splits=["test", "unassigned", "unassigned"] * 2)
+    assert 'load_dataset("card-germany", "frames", split="test")' in (tree / "README.md").read_text()
+
+
 def test_a_missing_template_is_named(tmp_path: Path) -> None:
     terms = LICENSES["licenses"]["CC-BY-4.0"] | {"text": "absent.txt"}
     with pytest.raises(CardError, match=r"No such file or directory.*absent\.txt"):

@@ -50,6 +50,7 @@ def write_pages(
         if terms["commercial"]
         else "Commercial use is not permitted.",
         "front_matter": yaml.safe_dump(front_matter(release, about["title"], has_mini), sort_keys=False),
+        "example_split": next((split for split in SPLITS if release["frames"][split]), SPLITS[0]),
         "counts": _counts(release, sequences),
         "split_table": _table(("split", "frames"), [(split, release["frames"][split]) for split in SPLITS]),
         "sequence_table": _table(
