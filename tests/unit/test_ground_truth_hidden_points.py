@@ -3,6 +3,7 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from card.artifacts import default_settings
+from card.errors import CardError
 from card.ground_truth.hidden_points import diagonal, two_pass_visibility, visible_points
 
 SETTINGS = default_settings("ground_truth")
@@ -54,8 +55,8 @@ def test_points_in_one_plane_with_the_viewer_hide_nothing():
 def test_two_passes_by_their_definition():
     static, key = cloud(1), cloud(2, 80)
     own = np.arange(len(static)) % 5 == 0
-    first, second, of_key = two_pass_visibility(static, own, key, SETTINGS)
-    D = diagonal(static)
+    D = 1.5 * diagonal(static)
+    first, second, of_key = two_pass_visibility(static, own, key, D, SETTINGS)
     assert set(first.tolist()) == hull_of_flipped(static, 100 * D)
     survivors = [i for i in first.tolist() if not own[i]]
     seen = hull_of_flipped(np.concatenate([static[survivors], key]), 210 * D)
@@ -65,6 +66,21 @@ def test_two_passes_by_their_definition():
 
 def test_a_frame_without_static_points_keeps_its_keyframe():
     key = cloud(3, 50)
-    first, second, of_key = two_pass_visibility(np.empty((0, 3)), np.empty(0, bool), key, SETTINGS)
+    first, second, of_key = two_pass_visibility(np.empty((0, 3)), np.empty(0, bool), key, 0.0, SETTINGS)
     assert len(first) == len(second) == 0
-    assert set(of_key.tolist()) == hull_of_flipped(key, 210 * diagonal(key))
+    with_viewer = diagonal(np.concatenate([key, np.zeros((1, 3))]))
+    assert set(of_key.tolist()) == hull_of_flipped(key, 210 * with_viewer)
+
+
+def test_a_speck_of_static_points_does_not_shrink_the_sphere():
+    speck = np.array([10.0, 0.0, 40.0]) + 0.01 * cloud(4, 6)
+    key = cloud(5, 200)
+    _, _, of_key = two_pass_visibility(speck, np.zeros(6, bool), key, diagonal(speck), SETTINGS)
+    D = diagonal(np.concatenate([speck, key, np.zeros((1, 3))]))
+    seen = hull_of_flipped(np.concatenate([speck, key]), 210 * D)
+    assert set((of_key + len(speck)).tolist()) == {n for n in seen if n >= len(speck)}
+
+
+def test_a_point_beyond_the_sphere_is_refused():
+    with pytest.raises(CardError, match="too far away"):
+        visible_points(cloud(6), 1.0)

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from card.geometry import apply, inverse
-from card.ground_truth.hidden_points import two_pass_visibility
+from card.ground_truth.hidden_points import diagonal, two_pass_visibility
 from card.ground_truth.left_camera import LeftCamera
 from card.ground_truth.mad import mad_inliers
 from card.ground_truth.static_set import StaticSet
@@ -97,7 +97,10 @@ def build_frame(
     key = key[camera.in_view(key, margin, nearest)]
     key = key[~camera.on_ego(key)]
     counts["points_keyframe"] = len(key)
-    first, second, of_key = two_pass_visibility(points, cloud.burst[kept] == keyframe_burst, key, settings)
+    # Good to a voxel, and the same whatever the view keeps of the cloud.
+    diameter = diagonal(corners[redundant])
+    of_burst = cloud.burst[kept] == keyframe_burst
+    first, second, of_key = two_pass_visibility(points, of_burst, key, diameter, settings)
     counts |= {"points_pass_1": len(first), "points_pass_2": len(second) + len(of_key)}
     visible = np.concatenate([points[second], key[of_key]])
 
