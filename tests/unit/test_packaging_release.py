@@ -262,6 +262,14 @@ def test_the_card_shows_a_split_that_can_be_loaded(tmp_path: Path) -> None:
     assert 'load_dataset("card-germany", "frames", split="test")' in (tree / "README.md").read_text()
 
 
+def test_a_tree_whose_last_sequence_left_is_valid_and_empty(tmp_path: Path) -> None:
+    build_tree(tmp_path)
+    tree = assemble_tree(tmp_path, [])
+    assert find_problems(tree, load=True) == []
+    assert not (tree / "data").exists()
+    assert not (tree / "sequences").exists()
+
+
 def test_a_missing_template_is_named(tmp_path: Path) -> None:
     terms = LICENSES["licenses"]["CC-BY-4.0"] | {"text": "absent.txt"}
     with pytest.raises(CardError, match=r"No such file or directory.*absent\.txt"):

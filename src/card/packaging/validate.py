@@ -67,7 +67,8 @@ def find_problems(
     findings = contents.findings + [line for check in CHECKS for line in check(contents)]
     if ledger is not None:
         findings += check_splits(contents, ledger)
-    if load and not findings:
+    # An empty tree has no configs, and `datasets` would make one up.
+    if load and contents.sequences and not findings:
         findings += _check_loading(tree)
     return findings
 
