@@ -23,7 +23,7 @@ from card.artifacts import (
     write_report,
     write_table,
 )
-from card.artifacts.schemas import load_schema, schema_folder
+from card.artifacts.schemas import check, default_settings, load_schema, schema_folder
 from card.errors import CardError
 
 GATE = {"figure": "rms_mm", "unit": "mm", "better": "lower", "threshold": 2.0}
@@ -303,3 +303,19 @@ def test_a_gate_in_another_unit_than_its_figure_is_refused(tmp_path: Path) -> No
             figures=[Figure("residual", 0.5, "m", "Residual")],
             gates=[gate],
         )
+
+
+@pytest.mark.parametrize("stage", ["splits", "packaging", "privcy"])
+def test_a_gate_that_nothing_would_enforce_is_refused(stage: str) -> None:
+    gate = {**GATE, "stage": stage, "threshold": {"full": 1.0}}
+    check([{**gate, "stage": "privacy"}], "gates", "gates.yaml")
+    with pytest.raises(CardError, match=r"gates.yaml: 0/stage does not fit schema gates"):
+        check([gate], "gates", "gates.yaml")
+
+
+@pytest.mark.parametrize("field", ["signed_by", "reason"])
+def test_a_blank_signature_signs_nothing(field: str) -> None:
+    override = {"figure": "recall_face_pct", "signed_by": "A. Person", "reason": "gravel"}
+    settings = default_settings("privacy") | {"overrides": [override | {field: " "}]}
+    with pytest.raises(CardError, match=f"overrides/0/{field} does not fit schema"):
+        check(settings, "settings/privacy", "config.yaml")
