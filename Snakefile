@@ -1,7 +1,7 @@
 # From raw drives to licensed, anonymized, validated release trees.
 #
 #   snakemake release --cores 2           build and validate all trees (the default)
-#   snakemake validate --cores 2          validate them again
+#   snakemake validate --cores 2          the same without the rest of the embedded input
 #   snakemake report --cores 2            a page of maps, overlays and quality figures
 #   snakemake benchmark --cores 2         evaluate predictions on the release
 #   snakemake assign_splits --cores 2     give new sequences their rows in the splits ledger
@@ -37,7 +37,6 @@ rule release:
 
 
 onstart:
-    warn_lost_records()
     check_space()
 
 

@@ -315,7 +315,12 @@ def test_a_gate_that_nothing_would_enforce_is_refused(stage: str) -> None:
 
 @pytest.mark.parametrize("field", ["signed_by", "reason"])
 def test_a_blank_signature_signs_nothing(field: str) -> None:
-    override = {"figure": "recall_face_pct", "signed_by": "A. Person", "reason": "gravel"}
+    override = {
+        "sequences": ["drive"],
+        "figure": "recall_face_pct_low",
+        "signed_by": "A. Person",
+        "reason": "gravel",
+    }
     settings = default_settings("privacy") | {"overrides": [override | {field: " "}]}
     with pytest.raises(CardError, match=f"overrides/0/{field} does not fit schema"):
         check(settings, "settings/privacy", "config.yaml")

@@ -181,7 +181,7 @@ def test_a_bundle_that_cannot_be_true_is_refused(
 @pytest.mark.parametrize(
     ("mask", "message"),
     [
-        (np.zeros((8, 9), dtype=np.uint8), r"not as large as the undistorted left image \(found 9 x 8"),
+        (np.zeros((8, 9), dtype=np.uint8), r"ego mask of the wrong size \(found 9 x 8"),
         (None, "unreadable ego mask"),
         ("grey", "ego mask has other values.*128"),
         ("colour", "one channel"),

@@ -90,6 +90,13 @@ def test_points_behind_the_camera_have_no_pixel() -> None:
     assert np.isnan(CAMERA.project([[0.0, 0.0, -1.0]])).all()
 
 
+def test_points_beyond_the_fold_of_the_distortion_have_no_pixel() -> None:
+    lens = CameraModel(100, 100, 50.0, 50.0, 49.5, 49.5, (-0.3, 0.0, 0.0, 0.0, 0.0))
+    fold = np.sqrt(1 / 0.9)  # where the derivative 1 - 0.9 r^2 vanishes
+    pixels = lens.project([[0.99 * fold, 0.0, 1.0], [1.01 * fold, 0.0, 1.0]])
+    assert np.isnan(pixels).tolist() == [[False, False], [True, True]]
+
+
 def test_image_edges_are_half_a_pixel_out() -> None:
     inside = CAMERA.contains([[-0.5, -0.5], [2247.49, 2251.49], [2247.5, 0], [0, -0.51]])
     assert inside.tolist() == [True, True, False, False]

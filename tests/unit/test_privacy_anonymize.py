@@ -131,8 +131,10 @@ def test_without_labels_the_gate_fails_closed_until_someone_signs(drive):
     out = run(drive, gates=[GATE])
     assert report_of(out)["gates"][0]["verdict"] == "fail"
     assert "recall is unknown" in report_of(out)["notes"][0]
-    override = {"figure": "recall_face_pct", "signed_by": "J. Doe", "reason": "no people on the test track"}
-    run(drive, gates=[GATE], overrides=[override])
+    signature = {"figure": "recall_face_pct", "signed_by": "J. Doe", "reason": "no people on the test track"}
+    run(drive, gates=[GATE], overrides=[signature | {"sequences": ["another_drive"]}])
+    assert report_of(out)["gates"][0]["verdict"] == "fail"
+    run(drive, gates=[GATE], overrides=[signature | {"sequences": [report_of(out)["sequence"]]}])
     gate = report_of(out)["gates"][0]
     assert (gate["verdict"], gate["signed_by"]) == ("overridden", "J. Doe")
 

@@ -107,7 +107,7 @@ def test_what_is_no_sensor_s_lies_beside_the_bag(native: Path, tmp_path: Path) -
     assert (tmp_path / "privacy_labels.csv").is_file()
     assert not any((tmp_path / sensor).exists() for sensor in (*CAMERAS, *LIDARS, "imu.parquet"))
     description = read_description(tmp_path)
-    assert description["sensors"]["lidar_front"]["column_period_ns"] == 400 * 2777
+    assert description["sensors"]["lidar_front"]["column_period_ns"] == 1_111_111
     assert set(description["bag"]["topics"]) == {*CAMERAS, *LIDARS, "imu"}
 
 

@@ -96,7 +96,7 @@ def test_an_edited_comment_reruns_nothing(built: Project) -> None:
         assert built.plan() == set()
 
 
-def test_a_subset_plans_only_its_sequences(built: Project) -> None:
+def test_a_subset_plans_only_its_sequences_and_leaves_the_release_alone(built: Project) -> None:
     assert built.plan("--config", f"sequences={TOWN}") == tree(GERMANY)
     assert built.plan("--forceall", "--config", f"sequences={TOWN}") == (
         chain(TOWN, "calibration", *STAGES, "simulate_drive")
@@ -125,25 +125,40 @@ def test_a_quarantined_sequence_reassembles_its_tree_only(built: Project) -> Non
 def test_an_added_sequence_runs_its_own_chain(built: Project) -> None:
     added = "de_second_town"
     line = sheet_line(built, TOWN)
-    shutil.copytree(built.root / "recordings" / TOWN, built.root / "recordings" / added)
+    folder = built.root / "recordings" / added
+    shutil.copytree(built.root / "recordings" / TOWN, folder)
+    description = folder / "recording.yaml"
+    description.write_text(description.read_text().replace(f"id: {TOWN}", f"id: {added}"))
     try:
         with built.changed("config/sequences.tsv", line, line + line.replace(TOWN, added)):
             assert built.plan() == chain(added, "calibration", *STAGES) | tree(GERMANY)
     finally:
-        shutil.rmtree(built.root / "recordings" / added)
+        shutil.rmtree(folder)
 
 
-def test_another_country_moves_the_sequence_and_nothing_is_measured_again(built: Project) -> None:
+def test_the_sheet_may_not_contradict_the_recording(built: Project) -> None:
     line = sheet_line(built, TOWN)
     with built.changed("config/sequences.tsv", line, line.replace("\tDE\t", "\tIT\t")):
-        assert built.plan() == chain(TOWN, "package") | tree(GERMANY, ITALY)
+        result = built.run("--dry-run")
+    assert result.returncode != 0
+    assert "country differs from the sheet (found DE, wanted IT)" in result.stdout
+
+
+def test_another_country_moves_the_sequence(built: Project) -> None:
+    line = sheet_line(built, TOWN)
+    with (
+        built.changed("config/sequences.tsv", line, line.replace("\tDE\t", "\tIT\t")),
+        built.changed(f"recordings/{TOWN}/recording.yaml", "country: DE", "country: IT"),
+    ):
+        assert built.plan() == chain(TOWN, *STAGES) | tree(GERMANY, ITALY)
 
 
 def test_another_licence_of_a_country_repacks_its_sequences(built: Project) -> None:
     german = [id for id in DRIVES if id.startswith("de_")]
     with built.changed("config/licenses.yaml", "DE: CC-BY-4.0", "DE: CC-BY-NC-4.0"):
         plan = built.plan()
-    assert plan == {("package", id) for id in german} | tree(ITALY)
+    # The emptied tree is assembled too: nothing of the old licence may stay in it.
+    assert plan == {("package", id) for id in german} | tree(GERMANY, ITALY)
 
 
 def test_a_ledger_row_moves_only_its_sequence(built: Project) -> None:
@@ -155,6 +170,23 @@ def test_a_ledger_row_moves_only_its_sequence(built: Project) -> None:
         assert built.plan() == chain(TOWN, "splits") | tree(GERMANY)
 
 
-def test_a_lost_snakemake_folder_reruns_nothing(built: Project, tmp_path: Path) -> None:
+def test_lost_records_are_refused(built: Project, tmp_path: Path) -> None:
     with without(built.root / ".snakemake", tmp_path / "aside"):
-        assert built.plan() == set()
+        result = built.run("--dry-run")
+        assert result.returncode != 0
+        assert "results are there but not the records of how they were made" in result.stdout
+        assert built.run("--dry-run", "--forceall").returncode == 0
+
+
+def test_an_interrupted_run_is_taken_up_where_it_stopped(built: Project) -> None:
+    image = sorted((built.root / "recordings" / TOWN / "camera_left").iterdir())[0]
+    content = image.read_bytes()
+    other = sorted((built.root / "recordings" / "de_rural_potholes" / "camera_left").iterdir())[0]
+    image.write_bytes(other.read_bytes())
+    try:
+        built.build(f"results/{TOWN}/frames.parquet")
+        assert chain(TOWN, "privacy", "package") <= built.plan()
+    finally:
+        image.write_bytes(content)
+        built.build("release")
+    assert built.plan() == set()

@@ -15,7 +15,7 @@ rule annotations:
     params:
         cfg=cfg("annotations"),
         code=code("annotations"),
-        raw=raw_fingerprint("annotations"),
+        raw=raw_fingerprint(raw_folder, "annotations"),
         recording=recording_folder,
         annotations=lambda wildcards: f"{raw_folder(wildcards)}/annotations",
     script:

@@ -1,32 +1,37 @@
 # The checked configuration, the sequences to build, settings and code of a stage, what a run says.
 import os
+import sys
 from pathlib import Path
 
 from card.artifacts.code import code_hash
 from card.artifacts.documents import read_yaml
-from card.artifacts.schemas import check, load_schema, with_defaults
+from card.artifacts.schemas import check, load_schema, schema_folder, with_defaults
 from card.errors import CardError
+from card.packaging.licenses import read_licenses
 from card.packaging.summary import summarize
 from card.recording.description import check_identity
 from card.recording.fingerprint import fingerprint
 from card.recording.sheet import read_sequences
 from card.recording.space import require_space
+from card.splits.ledger import COLUMNS, read_ledger
 
 BASE = Path(workflow.basedir)
 SETTINGS = with_defaults(config, load_schema("config"))
 RAW = SETTINGS["recordings"]
+SUBSET = [name for name in str(SETTINGS["sequences"]).split(",") if name]
+# Part of a release is no release: it must not take the place of the whole one.
+RELEASE = "results/release-subset" if SUBSET else "results/release"
 CAMERAS = ("camera_left", "camera_right")
 LIDARS = ("lidar_front", "lidar_rear")
 
 
 def load_plan():
-    """The checked configuration: licences, gates and the sequences to build, by id."""
+    """The checked configuration: licences, gates, splits ledger and the sequences to build, by id."""
     check(SETTINGS, "config", "config/config.yaml")
-    licenses = read_yaml(Path(SETTINGS["licenses"]), "licenses")
+    licenses = read_licenses(Path(SETTINGS["licenses"]))
     gates = read_yaml(Path(SETTINGS["gates"]), "gates")
     rows = read_sequences(Path(SETTINGS["sheet"]), licenses["countries"])
-    wanted = [name for name in str(SETTINGS["sequences"]).split(",") if name]
-    unknown = sorted(set(wanted) - {row.id for row in rows})
+    unknown = sorted(set(SUBSET) - {row.id for row in rows})
     if unknown:
         raise CardError(
             "unknown sequence", where="--config sequences", found=unknown[0]
@@ -34,11 +39,30 @@ def load_plan():
     chosen = {
         row.id: row
         for row in rows
-        if not row.quarantine and (not wanted or row.id in wanted)
+        if not row.quarantine and (not SUBSET or row.id in SUBSET)
     }
     for row in chosen.values():
         check_raw_input(row)
-    return licenses, gates, chosen
+    ledger = [
+        dict(zip(COLUMNS, line.cells()))
+        for line in read_ledger(Path(SETTINGS["splits_ledger"]))
+    ]
+    return licenses, gates, ledger, chosen
+
+
+def check_records():
+    """Without its records of earlier runs the workflow cannot see what changed: refuse to build on results."""
+    records = Path(".snakemake", "metadata")
+    if {"--touch", "--forceall", "-F"} & set(sys.argv) or not list(
+        Path("results").glob("*/*.report.json")
+    ):
+        return
+    if not records.is_dir() or not any(records.iterdir()):
+        raise CardError(
+            "results are there but not the records of how they were made",
+            where=".snakemake",
+            wanted="the folder back; or --touch, if nothing changed since; or --forceall",
+        )
 
 
 def check_raw_input(row):
@@ -70,7 +94,8 @@ def check_raw_input(row):
 
 
 try:
-    LICENSES, GATES, SEQUENCES = load_plan()
+    check_records()
+    LICENSES, GATES, LEDGER, SEQUENCES = load_plan()
 except CardError as error:
     raise WorkflowError(f"card: {error}") from None
 
@@ -96,7 +121,7 @@ def cfg(stage, *names):
             "threshold": gate["threshold"][scale],
         }
         for gate in GATES
-        if gate["stage"] == stage and scale in gate["threshold"]
+        if gate["stage"] == stage
     ]
     return {"settings": settings, "gates": gates}
 
@@ -121,7 +146,7 @@ def check_space():
 
 def print_summary():
     """What a run ends with: sequences, frames, files, bytes, gates, and where to look."""
-    print(summarize(Path("results", "release")))
+    print(summarize(Path(RELEASE)))
 
 
 def print_failure():
@@ -129,11 +154,3 @@ def print_failure():
         "card: not everything could be built; the lines that begin with 'card:' say why. Mend the input, or give the"
         f" sequence a reason under quarantine in {SETTINGS['sheet']}, and run again: what is done is kept."
     )
-
-
-def warn_lost_records():
-    """Without its records the workflow does not see changed settings; say so rather than keep stale results."""
-    if Path("results").is_dir() and not Path(".snakemake", "metadata").is_dir():
-        print(
-            "card: the records of earlier runs are gone: settings changed since then go unseen; --forceall rebuilds"
-        )

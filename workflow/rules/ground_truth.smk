@@ -4,6 +4,7 @@
 
 rule ground_truth:
     input:
+        inventory=rules.ingest.output.inventory,
         bursts=rules.ingest.output.bursts,
         frames=rules.ingest.output.frames,
         calibration=rules.calibration.output.calibration,

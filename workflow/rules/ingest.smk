@@ -34,7 +34,9 @@ rule ingest:
         cfg=cfg("ingest"),
         code=code("ingest"),
         row=row("id", "modalities"),
-        raw=raw_fingerprint(*CAMERAS, *LIDARS, "imu.parquet", "recording.yaml"),
+        raw=raw_fingerprint(
+            recording_folder, *CAMERAS, *LIDARS, "imu.parquet", "recording.yaml"
+        ),
         recording=recording_folder,
         ledger=f"{RAW}/ledger/frames/{{id}}.tsv",
     script:

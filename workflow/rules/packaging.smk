@@ -3,7 +3,7 @@
 REPOSITORIES = {
     terms["repository"]: spdx for spdx, terms in LICENSES["licenses"].items()
 }
-TREE = "results/release/{repository}"
+TREE = f"{RELEASE}/{{repository}}"
 TEMPLATES = Path(os.path.relpath(BASE / "release"))
 PACKED = {
     "frames": ("ingest", "frames"),
@@ -52,6 +52,7 @@ rule assemble:
     input:
         packages=tree_packages,
         splits=tree_splits,
+        schemas=sorted(os.path.relpath(path) for path in schema_folder().glob("*.json")),
         changelog=str(TEMPLATES / "CHANGELOG.md"),
         templates=sorted(str(path) for path in TEMPLATES.rglob("*") if path.is_file()),
     output:

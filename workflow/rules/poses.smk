@@ -4,7 +4,8 @@
 
 rule poses:
     input:
-        delivered=lambda wildcards: f"{raw_folder(wildcards)}/trajectory.tum",
+        unpack(delivered_trajectory),
+        inventory=rules.ingest.output.inventory,
         bursts=rules.ingest.output.bursts,
         frames=rules.ingest.output.frames,
         calibration=rules.calibration.output.calibration,

@@ -4,6 +4,7 @@
 
 rule privacy:
     input:
+        inventory=rules.ingest.output.inventory,
         frames=rules.ingest.output.frames,
     output:
         images="results/{id}/anonymized/images.parquet",
@@ -13,9 +14,9 @@ rule privacy:
     log:
         "logs/{id}/privacy.log",
     params:
-        cfg=cfg("privacy"),
+        cfg=privacy_cfg,
         code=code("privacy"),
-        raw=raw_fingerprint("privacy_labels.csv"),
+        raw=raw_fingerprint(raw_folder, "privacy_labels.csv"),
         recording=recording_folder,
         labelled=lambda wildcards: f"{raw_folder(wildcards)}/privacy_labels.csv",
         out=subpath(output.images, parent=True),

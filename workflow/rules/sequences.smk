@@ -25,13 +25,12 @@ def recording_folder(wildcards):
     )
 
 
-def raw_fingerprint(*names):
-    """A param function: fingerprint of the named files and folders of a sequence's raw recording."""
+def raw_fingerprint(folder_of, *names):
+    """A param function: fingerprint of the named files and folders in a sequence's folder."""
 
     def of_sequence(wildcards):
-        folder, cache = Path(raw_folder(wildcards)), Path(
-            "results", wildcards.id, "fingerprints"
-        )
+        folder = Path(folder_of(wildcards))
+        cache = Path("results", wildcards.id, "fingerprints", folder.name)
         return {
             name: fingerprint(folder / name, cache / f"{name}.json") for name in names
         }
@@ -86,13 +85,40 @@ def simulated_days():
 
 def raw_bag_fingerprint(wildcards):
     """Fingerprint of all that belongs to the bag: not of labels and trajectories that lie beside it."""
-    beside = {"annotations", "privacy_labels.csv", "trajectory.tum"}
+    labels = {"annotations", "privacy_labels.csv"}
+    beside = labels | {
+        Path(path).name for path in delivered_trajectory(wildcards).values()
+    }
     names = sorted(
         path.name
         for path in Path(raw_folder(wildcards)).glob("*")
         if path.name not in beside
     )
-    return raw_fingerprint(*names)(wildcards)
+    return raw_fingerprint(raw_folder, *names)(wildcards)
+
+
+def delivered_trajectory(wildcards):
+    """The files of another system's trajectory, in the format that the settings name."""
+    settings = SETTINGS["poses"]
+    files = {
+        "tum": {"delivered": "trajectory.tum"},
+        "kitti": {"delivered": "trajectory.txt", "times": settings["times_file"]},
+    }
+    folder = raw_folder(wildcards)
+    return {
+        name: f"{folder}/{file}" for name, file in files[settings["format"]].items()
+    }
+
+
+def privacy_cfg(wildcards):
+    """Settings and gates of the privacy stage with only those overrides that are signed for the sequence."""
+    chosen = cfg("privacy")
+    signed = [
+        override
+        for override in chosen["settings"]["overrides"]
+        if wildcards.id in override["sequences"]
+    ]
+    return {**chosen, "settings": {**chosen["settings"], "overrides": signed}}
 
 
 def session_bundle(wildcards):
@@ -171,7 +197,8 @@ def tree_splits(wildcards):
 
 
 def validations():
-    repositories = [name for name in REPOSITORIES if in_tree(name)]
+    """All trees, an emptied one too; of a subset just those that it has sequences for."""
+    repositories = [name for name in REPOSITORIES if in_tree(name) or not SUBSET]
     return expand(rules.validate_tree.output.validation, repository=repositories)
 
 

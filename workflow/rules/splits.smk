@@ -1,11 +1,5 @@
 # Needs: labels and frames of a sequence, its rows of the committed ledger.
 # Makes: results/{id}/splits.parquet. The ledger itself grows only by the target assign_splits.
-from card.splits.ledger import COLUMNS, read_ledger
-
-LEDGER = [
-    dict(zip(COLUMNS, line.cells()))
-    for line in read_ledger(Path(SETTINGS["splits_ledger"]))
-]
 
 
 rule splits:

@@ -4,6 +4,7 @@
 
 rule wheels:
     input:
+        inventory=rules.ingest.output.inventory,
         bursts=rules.ingest.output.bursts,
         frames=rules.ingest.output.frames,
         calibration=rules.calibration.output.calibration,

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from card.artifacts import Figure, read_json, write_json, write_report
+from card.artifacts.masks import read_ego_mask, write_ego_mask
 from card.calibration.checks import baseline, check_bundle
-from card.calibration.ego_mask import read_ego_mask, write_ego_mask
 from card.errors import CardError
 
 BUNDLE = "calibration.json"

@@ -5,6 +5,7 @@ D. C. Brown, "Close-Range Camera Calibration", Photogrammetric Engineering, 1971
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -49,11 +50,23 @@ class CameraModel:
         return np.stack([xd, yd], axis=-1)
 
     def project(self, points: ArrayLike) -> Array:
-        """Pixels (N, 2) of points (N, 3) in the camera frame, metres; NaN where z <= 0."""
+        """Pixels (N, 2) of points (N, 3) in the camera frame, metres.
+
+        NaN where z <= 0 and beyond the radius at which the distortion folds the image back onto itself.
+        """
         p = np.asarray(points, dtype=np.float64)
         front = p[..., 2:] > 0
         normalized = np.where(front, p[..., :2], np.nan) / np.where(front, p[..., 2:], 1.0)
-        return self.distort(normalized) * (self.fx, self.fy) + (self.cx, self.cy)
+        folded = np.sum(normalized**2, axis=-1, keepdims=True) >= self._max_radius**2
+        return self.distort(np.where(folded, np.nan, normalized)) * (self.fx, self.fy) + (self.cx, self.cy)
+
+    @cached_property
+    def _max_radius(self) -> float:
+        """Normalised radius up to which r (1 + k1 r^2 + k2 r^4 + k3 r^6) grows."""
+        k1, k2, _, _, k3 = self.distortion
+        squared = np.roots([7 * k3, 5 * k2, 3 * k1, 1.0])
+        turns = [root.real for root in squared if abs(root.imag) < 1e-9 and root.real > 0]
+        return float(np.sqrt(min(turns, default=np.inf)))
 
     def rays(self, pixels: ArrayLike) -> Array:
         """Ray directions (..., 3) with z = 1 of pixels (..., 2): the inverse of `project`.

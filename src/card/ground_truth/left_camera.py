@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from card.errors import CardError
+from card.artifacts.masks import read_ego_mask
 from card.geometry import CameraModel, from_json
 
 Points = npt.NDArray[np.float64]
@@ -27,7 +27,7 @@ class LeftCamera:
         self.image = CameraModel.from_json(calibration["cameras"]["camera_left"])
         self.undistorted = CameraModel.from_json(calibration["camera_left_undistorted"])
         self.rig_from_camera = from_json(calibration["extrinsics"]["rig_from_camera_left"])
-        self._ego = read_ego_mask(ego_mask, self.undistorted)
+        self._ego = read_ego_mask(ego_mask, self.undistorted.width, self.undistorted.height) == 255
         border = self.image.rays(_border(self.image.width, self.image.height))[:, :2]
         self._low, self._high = border.min(axis=0), border.max(axis=0)
 
@@ -74,30 +74,6 @@ class LeftCamera:
         column, row = np.rint(pixels[on]).astype(np.int64).T
         order = np.lexsort((points[on, 1], points[on, 0], points[on, 2], column, row))
         return on[order], np.stack([column, row], axis=1)[order]
-
-
-def read_ego_mask(path: Path, undistorted: CameraModel) -> Mask:
-    """(height, width) bool, True on the car's own body, of a PNG in the undistorted image space.
-
-    Raises
-    ------
-    CardError
-        If the file is no image or not of the undistorted image's size.
-    """
-    import cv2
-
-    mask = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
-    if mask is None:
-        raise CardError("unreadable ego mask", where=path, wanted="an 8-bit PNG")
-    wanted = (undistorted.height, undistorted.width)
-    if mask.shape != wanted:
-        raise CardError(
-            "ego mask of the wrong size",
-            where=path,
-            found=f"{mask.shape[1]} x {mask.shape[0]}",
-            wanted=f"{wanted[1]} x {wanted[0]}, the undistorted left image",
-        )
-    return np.asarray(mask) > 127
 
 
 def _border(width: int, height: int) -> Points:

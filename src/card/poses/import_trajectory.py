@@ -71,6 +71,10 @@ def import_trajectory(
     else:
         notes.append("no IMU: the trajectory keeps its delivered times and gravity is not checked")
 
+    rate_hz = (len(t_ns) - 1) / float((t_ns[-1] - t_ns[0]) * 1e-9)
+    if rate_hz < 0.99 * settings["min_rate_hz"]:
+        notes.append(f"poses were delivered at {rate_hz:.0f} Hz: between them the path is a straight line")
+
     write_table(trajectory, result.to_table(), "trajectory")
     write_json(poses, pose_document(members, result), "poses")
     write_report(

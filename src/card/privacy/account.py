@@ -113,6 +113,6 @@ def write_account(
             Figure("redacted_share_pct", share, "%", "Share of all pixels that were redacted."),
         ],
         gates=gates,
-        overrides=settings["overrides"],
+        overrides=[override for override in settings["overrides"] if sequence in override["sequences"]],
         notes=[] if labels else ["No labelled faces or plates: recall is unknown."],
     )

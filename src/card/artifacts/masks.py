@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from card.artifacts import atomic_file
+from card.artifacts.atomic import atomic_file
 from card.errors import CardError
 
 Mask = NDArray[np.uint8]
@@ -26,10 +26,10 @@ def read_ego_mask(path: Path, width: int, height: int) -> Mask:
         raise CardError("unreadable ego mask", where=path, wanted="PNG")
     if mask.shape != (height, width):
         raise CardError(
-            "ego mask is not as large as the undistorted left image",
+            "ego mask of the wrong size",
             where=path,
             found=" x ".join(str(size) for size in (mask.shape[1], mask.shape[0], *mask.shape[2:])),
-            wanted=f"{width} x {height}, one channel",
+            wanted=f"{width} x {height}, one channel, as the undistorted left image",
         )
     values = np.unique(mask)
     if mask.dtype != np.uint8 or not set(values.tolist()) <= {0, 255}:
