@@ -307,7 +307,7 @@ def test_a_gate_in_another_unit_than_its_figure_is_refused(tmp_path: Path) -> No
 
 @pytest.mark.parametrize("stage", ["splits", "packaging", "privcy"])
 def test_a_gate_that_nothing_would_enforce_is_refused(stage: str) -> None:
-    gate = {**GATE, "stage": stage, "threshold": {"full": 1.0}}
+    gate = {**GATE, "stage": stage, "threshold": dict.fromkeys(("tiny", "demo", "full"), 1.0)}
     check([{**gate, "stage": "privacy"}], "gates", "gates.yaml")
     with pytest.raises(CardError, match=r"gates.yaml: 0/stage does not fit schema gates"):
         check([gate], "gates", "gates.yaml")
