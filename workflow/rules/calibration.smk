@@ -11,6 +11,7 @@ rule calibration:
         report="results/{id}/calibration.report.json",
     log:
         "logs/{id}/calibration.log",
+    priority: 1
     params:
         cfg=cfg("calibration"),
         code=code("calibration"),

@@ -17,6 +17,7 @@ rule ground_truth:
         report="results/{id}/ground_truth.report.json",
     log:
         "logs/{id}/ground_truth.log",
+    priority: 1
     params:
         cfg=cfg("ground_truth"),
         code=code("ground_truth"),

@@ -10,6 +10,7 @@ rule import_bag:
         report="results/{id}/import_bag.report.json",
     log:
         "logs/{id}/import_bag.log",
+    priority: 1
     params:
         cfg=cfg("ingest"),
         code=code("import_bag"),
@@ -30,6 +31,7 @@ rule ingest:
         report="results/{id}/ingest.report.json",
     log:
         "logs/{id}/ingest.log",
+    priority: 1
     params:
         cfg=cfg("ingest"),
         code=code("ingest"),

@@ -15,6 +15,7 @@ rule poses:
         report="results/{id}/poses.report.json",
     log:
         "logs/{id}/poses.log",
+    priority: 1
     params:
         cfg=cfg("poses"),
         code=code("poses"),
