@@ -237,6 +237,7 @@ def test_an_override_is_told_in_card_and_summary(tmp_path: Path) -> None:
     assert "released because gravel (signed by A. Person)" in (tree / "README.md").read_text()
     text = summarize(tree.parent)
     assert "gates: 0 passed, 0 failed, 1 overridden" in text
+    assert "gravel (signed by A. Person): de_test\n" in text
     assert "no split yet: de_test; run `snakemake assign_splits`" in text
     assert "NOT VALIDATED" in text
 

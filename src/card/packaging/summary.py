@@ -1,7 +1,7 @@
 """The few lines that end a run: what was released, how good it is, where to look."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -31,18 +31,22 @@ def summarize(release: Path) -> str:
     lines.append(
         f"gates: {verdicts['pass']} passed, {verdicts['fail']} failed, {verdicts['overridden']} overridden"
     )
-    for document in documents:
-        lines += [
-            f"  overridden: {item['sequence']}, {item['stage']}, {item['figure']}: {item['reason']} "
-            f"(signed by {item['signed_by']})"
-            for item in document["overrides"]
-        ]
+    lines += _overridden([item for document in documents for item in document["overrides"]])
     if waiting := _without_split(trees):
         lines.append(
             f"no split yet: {', '.join(waiting)}; run `snakemake assign_splits`, commit the ledger, release"
         )
     lines.append("look at: " + ", ".join(str(tree / "README.md") for tree in trees))
     return "\n".join(lines)
+
+
+def _overridden(overrides: Sequence[Mapping[str, str]]) -> list[str]:
+    """One line for each override, however many sequences it is signed for."""
+    sequences: dict[str, list[str]] = {}
+    for item in overrides:
+        what = f"{item['stage']} {item['figure']}: {item['reason']} (signed by {item['signed_by']})"
+        sequences.setdefault(what, []).append(item["sequence"])
+    return [f"  overridden {what}: {', '.join(sorted(names))}" for what, names in sorted(sequences.items())]
 
 
 def _is_validated(tree: Path) -> bool:
