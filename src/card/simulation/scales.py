@@ -28,7 +28,7 @@ SCALES = {
     scale.name: scale
     for scale in (
         Scale("tiny", 140, 140, 90, 6.0, 2.0, 0.5),
-        Scale("demo", 562, 563, 250, 45.0, 8.0, 5.0),
+        Scale("demo", 562, 563, 200, 45.0, 8.0, 5.0),
         Scale("full", 2248, 2252, 2000, 120.0, 5.0, 80.0),
     )
 }
