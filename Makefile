@@ -22,7 +22,7 @@ release: setup
 	snakemake release --cores $(CORES)
 
 test: setup
-	pytest -n $(CORES) --dist loadgroup -m "not slow"
+	pytest -n $(CORES) --dist loadfile -m "not slow"
 
 test-slow: setup
 	pytest -m slow

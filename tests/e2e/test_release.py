@@ -9,8 +9,6 @@ from pathlib import Path
 import pytest
 from project import Project, copy_repository
 
-pytestmark = pytest.mark.xdist_group("built")
-
 TREES = ("card-germany", "card-italy")
 
 

@@ -6,10 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import pytest
 from project import Project
-
-pytestmark = pytest.mark.xdist_group("built")
 
 TOWN = "de_town_bumps"
 GERMANY, ITALY = "card-germany", "card-italy"
@@ -80,6 +77,11 @@ def test_a_setting_of_one_stage_reruns_that_stage_and_its_dependents(built: Proj
     expected = {(stage, id) for id in DRIVES for stage in ("wheels", "package")} | tree(GERMANY, ITALY)
     with built.changed("config/config.yaml", "simulation:", "wheels: {knot_spacing_m: 0.25}\nsimulation:"):
         assert built.plan() == expected
+
+
+def test_an_override_reruns_only_the_sequence_it_is_signed_for(built: Project) -> None:
+    with built.changed("config/config.yaml", ", it_zero_shot]\n      signed_by", "]\n      signed_by"):
+        assert built.plan() == chain("it_zero_shot", "privacy", "package") | tree(ITALY)
 
 
 def test_an_edited_module_reruns_the_stages_that_reach_it(built: Project) -> None:
