@@ -114,7 +114,7 @@ def privacy_cfg(wildcards):
     """Settings and gates of the privacy stage with only those overrides that are signed for the sequence."""
     chosen = cfg("privacy")
     signed = [
-        override
+        {**override, "sequences": [wildcards.id]}
         for override in chosen["settings"]["overrides"]
         if wildcards.id in override["sequences"]
     ]
