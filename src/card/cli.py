@@ -36,7 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     logging.basicConfig(format="%(message)s", level=logging.WARNING)
     try:
         options.run(options)
-    except CardError as error:
+    except (CardError, OSError) as error:
         print(f"card: {error}", file=sys.stderr)
         return 1
     return 0

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from card.errors import CardError
 from card.recording import fingerprint as module
 from card.recording.fingerprint import fingerprint
 
@@ -113,3 +114,15 @@ def test_parsing_the_workflow_stays_light() -> None:
     heavy = "{'numpy', 'pyarrow', 'laspy', 'yaml'}"
     code = f"import sys, card.recording.fingerprint; print({heavy} & set(sys.modules))"
     assert subprocess.check_output([sys.executable, "-c", code], text=True).strip() == "set()"
+
+
+def test_linked_folders_count_and_broken_links_are_named(folder: Path, tmp_path: Path) -> None:
+    before = fingerprint(folder, tmp_path / "cache.json")
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    (elsewhere / "label.txt").write_text("0")
+    (folder / "labels").symlink_to(elsewhere)
+    assert fingerprint(folder, tmp_path / "cache.json") != before
+    (folder / "gone.laz").symlink_to(tmp_path / "nowhere")
+    with pytest.raises(CardError, match=r"gone\.laz: link leads nowhere"):
+        fingerprint(folder, tmp_path / "cache.json")

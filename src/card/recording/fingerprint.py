@@ -1,6 +1,6 @@
 """What raw data is, as one hash: content counts, times of files do not.
 
-Used while the workflow is parsed, for every recording: standard library only.
+Used while the workflow is parsed, for every recording: nothing beyond the standard library is loaded.
 """
 
 from __future__ import annotations
@@ -11,6 +11,8 @@ import os
 import time
 from collections.abc import Iterator
 from pathlib import Path
+
+from card.errors import CardError
 
 # A file changed this short before it was hashed may change again within its time stamp's grain.
 _SETTLED_NS = 2_000_000_000
@@ -27,7 +29,10 @@ def fingerprint(folder: Path, cache: Path) -> str:
     fresh: dict[str, list[int | str]] = {}
     digest = hashlib.sha256()
     for name, path in _files(folder):
-        stat = path.stat()
+        try:
+            stat = path.stat()
+        except FileNotFoundError as error:
+            raise CardError("link leads nowhere", where=path) from error
         stamp = [stat.st_size, stat.st_mtime_ns]
         entry = known.get(name)
         sha256 = str(entry[2]) if entry and entry[:2] == stamp else _sha256(path)
@@ -42,7 +47,7 @@ def _files(folder: Path) -> Iterator[tuple[str, Path]]:
         yield folder.name, folder
         return
     found = []
-    for root, _, names in os.walk(folder):
+    for root, _, names in os.walk(folder, followlinks=True):
         found += [(Path(root, name).relative_to(folder).as_posix(), Path(root, name)) for name in names]
     yield from sorted(found)
 
