@@ -9,8 +9,8 @@ from card.errors import CardError
 
 #: Results of a sequence, in multiples of its raw bytes: anonymized images, ground truth, shards.
 RESULTS_PER_RAW = 3
-#: Raw bytes of one simulated drive a scale, rounded up from drives that were made.
-SIMULATED_BYTES = {"tiny": 20_000_000, "demo": 400_000_000, "full": 12_000_000_000}
+#: Raw bytes of one simulated drive a scale, rounded up: tiny and demo as made, full as the paper's sequences.
+SIMULATED_BYTES = {"tiny": 5_000_000, "demo": 100_000_000, "full": 12_000_000_000}
 
 
 def require_space(work: Path, recordings: Sequence[Path], simulated: int, scale: str) -> None:
