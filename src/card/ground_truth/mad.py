@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from card.ground_truth.runs import runs_by_voxel
+
 _LOW = (1 << 32) - 1
 
 
@@ -30,11 +32,7 @@ def mad_inliers(
     """
     if not len(voxel):
         return np.zeros(0, dtype=np.bool_)
-    # Sorting whole numbers that hold voxel and position is many times faster than a stable argsort.
-    packed = np.sort((voxel.astype(np.int64) << 32) | np.arange(len(voxel)))
-    order, groups = packed & _LOW, packed >> 32
-    starts = np.flatnonzero(np.r_[True, groups[1:] != groups[:-1]])
-    counts = np.diff(np.r_[starts, len(groups)])
+    order, starts, counts = runs_by_voxel(voxel)
     ordered = points[order].astype(np.float64)
     means = np.add.reduceat(ordered, starts) / counts[:, None]
     group = np.repeat(np.arange(len(starts)), counts)

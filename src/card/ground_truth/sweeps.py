@@ -121,15 +121,13 @@ class Drive:
         return Sweep(world, part.time_ns, part.ring, int((~real).sum()), int((real & ~inside).sum()))
 
     def _world(self, burst: Burst, lidar: str, end_ns: int) -> npt.NDArray[np.float64]:
-        if self._deskewed[lidar]:
-            # The crop may have taken the last point, whose time is that of the pose.
-            burst = replace(burst, t_ns=end_ns, offset_ns=np.zeros_like(burst.offset_ns))
         return deskew_burst(
             burst,
             self._rig_from[lidar],
             self.trajectory,
             self._corrections[lidar],
             motion_compensate=not self._deskewed[lidar],
+            end_ns=end_ns,
         )
 
     def _check(self, bursts: Path) -> None:

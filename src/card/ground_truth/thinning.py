@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from card.ground_truth.runs import runs_by_voxel
+
 
 def thin(voxel: npt.NDArray[np.int32], limit: int) -> npt.NDArray[np.bool_]:
     """Which points (N,) stay if no voxel may keep more than `limit`: evenly spaced in the order given.
@@ -16,11 +18,8 @@ def thin(voxel: npt.NDArray[np.int32], limit: int) -> npt.NDArray[np.bool_]:
     keep = np.ones(len(voxel), dtype=np.bool_)
     if not limit or not len(voxel):
         return keep
-    packed = np.sort((voxel.astype(np.int64) << 32) | np.arange(len(voxel)))
-    order, groups = packed & 0xFFFFFFFF, packed >> 32
-    starts = np.flatnonzero(np.r_[True, groups[1:] != groups[:-1]])
-    counts = np.diff(np.r_[starts, len(groups)])
-    rank = np.arange(len(groups)) - np.repeat(starts, counts)
+    order, starts, counts = runs_by_voxel(voxel)
+    rank = np.arange(len(order)) - np.repeat(starts, counts)
     share = np.minimum(limit, counts)[np.repeat(np.arange(len(starts)), counts)]
     total = np.repeat(counts, counts)
     # Point k of n stays where floor(k limit / n) steps up: exactly `limit` times.
