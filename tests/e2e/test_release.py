@@ -73,6 +73,20 @@ def test_another_folder_gives_the_same_bytes(built: Project, tmp_path: Path) -> 
     assert sums(other) == sums(built)
 
 
+def test_new_sequences_get_their_splits_on_demand(built: Project) -> None:
+    ledger = built.root / "config" / "ledger" / "splits.tsv"
+    before = ledger.read_text()
+    header, first, *others = before.splitlines(keepends=True)
+    try:
+        ledger.write_text(header + first)
+        built.build("assign_splits")
+        after = ledger.read_text()
+        assert after.startswith(header + first)
+        assert {line.split("\t")[0] for line in after.splitlines()[2:]} == {x.split("\t")[0] for x in others}
+    finally:
+        ledger.write_text(before)
+
+
 def test_a_bad_sequence_fails_alone_and_quarantine_releases_the_rest(built: Project) -> None:
     before = sums(built)
     sweep = sorted((built.root / "recordings" / "de_town_bumps" / "lidar_front").iterdir())[2]
