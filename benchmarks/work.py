@@ -8,7 +8,7 @@ from pathlib import Path
 
 import yaml
 
-from card.artifacts import read_yaml
+from card.packaging.licenses import read_licenses
 from card.recording.sheet import read_sequences
 
 REPOSITORY = Path(__file__).resolve().parents[1]
@@ -28,7 +28,7 @@ class Work:
     def sequences(self) -> list[str]:
         """Ids of the simulated sequences that are released."""
         config = yaml.safe_load((self.folder / "config" / "config.yaml").read_text(encoding="utf-8"))
-        licenses = read_yaml(self.folder / "config" / "licenses.yaml", "licenses")
+        licenses = read_licenses(self.folder / "config" / "licenses.yaml")
         rows = read_sequences(self.folder / "config" / "sequences.tsv", licenses["countries"])
         return [row.id for row in rows if row.id in config["simulation"]["drives"] and not row.quarantine]
 

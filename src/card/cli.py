@@ -55,11 +55,12 @@ def _validate(options: argparse.Namespace) -> None:
 def _extend(options: argparse.Namespace) -> None:
     from card.artifacts import load_schema, read_yaml
     from card.artifacts.schemas import with_defaults
+    from card.packaging.licenses import read_licenses
     from card.recording.sheet import read_sequences
     from card.splits.extend import extend_ledger
 
     settings = with_defaults(read_yaml(options.config, "config"), load_schema("config"))
-    countries = read_yaml(Path(settings["licenses"]), "licenses")["countries"]
+    countries = read_licenses(Path(settings["licenses"]))["countries"]
     rows = extend_ledger(
         sequences=[sequence.as_dict() for sequence in read_sequences(Path(settings["sheet"]), countries)],
         results=options.results,

@@ -7,7 +7,7 @@ from card.artifacts.code import code_hash
 from card.artifacts.documents import read_yaml
 from card.artifacts.schemas import check, load_schema, schema_folder, with_defaults
 from card.errors import CardError
-from card.packaging.licenses import read_licenses
+from card.packaging.licenses import license_of, read_licenses
 from card.packaging.summary import summarize
 from card.recording.description import check_identity
 from card.recording.fingerprint import fingerprint

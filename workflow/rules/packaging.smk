@@ -41,7 +41,7 @@ rule package:
             "off_road",
             "modalities",
         ),
-        spdx=lambda wildcards: license_of(SEQUENCES[wildcards.id]),
+        spdx=lambda wildcards: license_of(SEQUENCES[wildcards.id].country, LICENSES),
         raw=raw_parts,
         out=subpath(output.inventory, parent=True),
     script:

@@ -129,10 +129,6 @@ def ledger_rows(names):
     return [line for line in LEDGER if line["sequence"] in names]
 
 
-def license_of(sequence):
-    return LICENSES["countries"][sequence.country]
-
-
 def stages_of(sequence):
     """The stages whose modalities a sequence has."""
     planned = {
@@ -177,7 +173,11 @@ def raw_parts(wildcards):
 
 def in_tree(repository):
     spdx = REPOSITORIES[repository]
-    return [sequence for sequence in SEQUENCES.values() if license_of(sequence) == spdx]
+    return [
+        sequence
+        for sequence in SEQUENCES.values()
+        if license_of(sequence.country, LICENSES) == spdx
+    ]
 
 
 def tree_packages(wildcards):
