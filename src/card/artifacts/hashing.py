@@ -3,16 +3,11 @@
 import hashlib
 from pathlib import Path
 
-CHUNK_BYTES = 1 << 20
-
 
 def sha256_file(path: Path) -> str:
     """Hexadecimal SHA-256 of a file's bytes."""
-    digest = hashlib.sha256()
     with path.open("rb") as stream:
-        while chunk := stream.read(CHUNK_BYTES):
-            digest.update(chunk)
-    return digest.hexdigest()
+        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def inventory(folder: Path) -> dict[str, list[str] | list[int]]:

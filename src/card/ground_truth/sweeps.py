@@ -11,13 +11,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from card.artifacts import read_table, read_yaml
+from card.artifacts import read_table
 from card.errors import CardError
 from card.estimation.deskew import deskew_burst
 from card.geometry import Trajectory, from_json
 from card.recording.burst import Burst
+from card.recording.description import read_description
 from card.recording.laz import read_burst
-from card.recording.paths import LIDARS, description_path
+from card.recording.paths import LIDARS
 
 FRONT, REAR = LIDARS
 #: World points kept between passes; a short drive is then read only once.
@@ -66,7 +67,7 @@ class Drive:
         self._settings = settings
         self._rig_from = {s: from_json(calibration["extrinsics"][f"rig_from_{s}"]) for s in LIDARS}
         self._corrections = calibration["lidar_corrections"]
-        description = read_yaml(description_path(recording), "recording")
+        description = read_description(recording)
         self.id: str = description["id"]
         sensors = description["sensors"]
         self._deskewed = {s: bool(sensors.get(s, {}).get("deskewed", False)) for s in LIDARS}

@@ -7,14 +7,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from card.artifacts import Figure, read_json, read_table, read_yaml, write_json, write_report, write_table
+from card.artifacts import Figure, read_json, read_table, write_json, write_report, write_table
 from card.geometry import Trajectory, from_json, inverse, quaternion_from_matrix
 from card.poses.anchor import anchor, tilt_deg, up_vector
 from card.poses.delivered import read_kitti, read_tum
 from card.poses.imu_checks import Imu, imu_figures, read_imu
 from card.poses.members import pose_document, read_members
 from card.poses.plausibility import check_coverage, check_motion, check_upright
-from card.recording.paths import description_path, imu_path
+from card.recording.description import read_description
+from card.recording.paths import imu_path
 
 WORLD_UP = np.array([0.0, 0.0, 1.0])
 
@@ -80,7 +81,7 @@ def import_trajectory(
     write_report(
         report,
         stage="poses",
-        sequence=read_yaml(description_path(recording), "recording")["id"],
+        sequence=read_description(recording)["id"],
         settings=settings,
         inputs=inputs,
         counts={"delivered_poses": len(t_ns), "poses": len(result.t_ns)},

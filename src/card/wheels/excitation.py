@@ -13,13 +13,12 @@ from card.artifacts import (
     read_arrays,
     read_json,
     read_table,
-    read_yaml,
     write_json,
     write_report,
     write_table,
 )
 from card.geometry import Trajectory, from_json
-from card.recording.paths import description_path
+from card.recording.description import read_description
 from card.wheels.arc_height import Corridor
 from card.wheels.contact_path import contact_path
 from card.wheels.profile import SplineSettings
@@ -67,7 +66,7 @@ def excite(
         name: contact_path(path, bundle["wheels"][name]["contact_m"], settings["min_step_m"])
         for name in WHEELS
     }
-    description = read_yaml(description_path(recording), "recording")
+    description = read_description(recording)
     files = moving_bursts(_burst_files(bursts, recording), paths["fl"], settings["min_step_m"])
     samples = collect_samples(
         progress(files, "wheels"),
