@@ -21,7 +21,7 @@ bag:
   topics: {lidar_front: /pandar_packets}
   channel_angles: {lidar_front: PandarXT32.csv}
 """
-CELLS = "real_xt32|recordings/real_xt32|rosbag2|DE|indoor|-|indoor|split|false|lidar_front|-"
+CELLS = "real_xt32|recordings/real_xt32|rosbag2|DE|indoor|-|indoor|day|split|false|lidar_front|-"
 
 
 def test_a_lidar_only_sequence_is_released(fresh: Project, test_data: Path) -> None:

@@ -44,6 +44,7 @@ def sheet_row(name: str = "de_test", **cells: Any) -> dict[str, Any]:
         "place": "test-town",
         "session": "2026-04-14-start",
         "road_type": "town",
+        "light": "day",
         "role": "split",
         "off_road": False,
         "modalities": ["camera_left", "camera_right", "lidar_front", "lidar_rear", "imu"],

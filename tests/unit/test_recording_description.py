@@ -17,6 +17,7 @@ ROW = Sequence(
     place="town",
     session="",
     road_type="town",
+    light="day",
     role="split",
     off_road=False,
     modalities=("imu",),

@@ -17,6 +17,7 @@ CELLS = {
     "place": "north",
     "session": "2026-04-14-start",
     "road_type": "town",
+    "light": "day",
     "role": "split",
     "off_road": "false",
     "modalities": "all",
@@ -65,11 +66,12 @@ def test_rows_are_typed(tmp_path: Path) -> None:
         ([changed(quarantine="")], "quarantine does not fit schema sequences"),
         ([changed(quarantine=" ")], "quarantine does not fit schema sequences"),
         ([changed(role="train")], "role does not fit schema sequences"),
+        ([changed(light="dusk")], "light does not fit schema sequences"),
         ([changed(off_road="no")], "off_road does not fit schema sequences"),
         ([changed(session="yesterday")], "session does not fit schema sequences"),
         ([changed(modalities="lidar_front,radar")], "modalities does not fit schema sequences"),
         ([changed(format="zip")], "format does not fit schema sequences"),
-        ([GOOD[:-1]], "tsv:2: wrong number of cells .found 10, wanted 11"),
+        ([GOOD[:-1]], "tsv:2: wrong number of cells .found 11, wanted 12"),
     ],
 )
 def test_bad_rows_are_told(tmp_path: Path, rows: list[list[str]], message: str) -> None:

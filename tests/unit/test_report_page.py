@@ -118,6 +118,7 @@ SHEET = {
     "place": "Town & Co",
     "country": "DE",
     "road_type": "town",
+    "light": "day",
     "role": "split",
     "session": "2026-04-14-start",
 }

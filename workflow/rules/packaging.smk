@@ -37,6 +37,7 @@ rule package:
             "place",
             "session",
             "road_type",
+            "light",
             "role",
             "off_road",
             "modalities",

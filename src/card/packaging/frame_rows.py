@@ -42,6 +42,7 @@ def frame_columns(
                 "country": sequence["country"],
                 "place": sequence["place"],
                 "road_type": sequence["road_type"],
+                "light": sequence["light"],
                 "off_road": sequence["off_road"],
                 "session": sequence["session"] or None,
                 **{f"has_{camera}": frame in packed.get(camera, ()) for camera in CAMERAS},

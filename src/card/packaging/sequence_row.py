@@ -28,6 +28,7 @@ def sequence_document(
         "country": sequence["country"],
         "place": sequence["place"],
         "road_type": sequence["road_type"],
+        "light": sequence["light"],
         "off_road": sequence["off_road"],
         "session": sequence["session"] or None,
         "spdx": spdx,

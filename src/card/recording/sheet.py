@@ -27,6 +27,7 @@ class Sequence:
     place: str
     session: str
     road_type: str
+    light: str
     role: str
     off_road: bool
     modalities: tuple[str, ...]

@@ -82,7 +82,7 @@ def _check_sequences(contents: Contents) -> Iterator[str]:
     by_id = {row["sequence"]: row for row in contents.sequences}
     for frame in frames:
         row = by_id.get(frame["sequence"], frame)
-        for name in ("country", "place", "road_type", "off_road", "session"):
+        for name in ("country", "place", "road_type", "light", "off_road", "session"):
             if frame[name] != row[name]:
                 yield f"metadata/frames: {_name(frame)} has another {name} than its sequence"
 
