@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from card.errors import CardError
-from card.estimation.corrections import correct_points
 from card.estimation.deskew import deskew_burst
 from card.geometry import Trajectory, apply, transform
+from card.geometry.corrections import correct_points
 from card.recording.burst import Burst
 
 START_NS = 1_776_153_600_000_000_000

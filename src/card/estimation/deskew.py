@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from card.errors import CardError
-from card.estimation.corrections import correct_points
 from card.geometry import Trajectory, apply
+from card.geometry.corrections import correct_points
 from card.recording.burst import Burst
 
 
