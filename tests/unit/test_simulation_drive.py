@@ -13,10 +13,15 @@ from card.estimation.deskew import deskew_burst
 from card.geometry import Trajectory
 from card.recording.laz import read_burst
 from card.recording.paths import list_bursts, list_images, stamp_of
-from card.simulation.drives import DRIVES
+from card.simulation.bodies import HEADLIGHTS_M
+from card.simulation.centreline import circuit
+from card.simulation.drives import DRIVES, drive_named
 from card.simulation.labels import outline, road_boxes
 from card.simulation.raycast import Tracer
+from card.simulation.scales import scale_named
 from card.simulation.simulate import simulate_drive
+from card.simulation.surfaces import Surface
+from card.simulation.vehicle import course
 from card.simulation.world import World, build_world
 
 DRIVE = "de_town_bumps"
@@ -139,7 +144,7 @@ def test_another_seed_makes_another_world(world: World) -> None:
 
 
 def test_unknown_drive_or_scale(tmp_path: Path) -> None:
-    with pytest.raises(CardError, match=r"unknown demo drive.*de_town_bumps"):
+    with pytest.raises(CardError, match=r"unknown simulated drive.*de_town_bumps"):
         simulate_drive("xx", recording=tmp_path / "r", truth=tmp_path / "t", scale="tiny", seed=1)
     with pytest.raises(CardError, match="unknown scale"):
         simulate_drive(DRIVE, recording=tmp_path / "r", truth=tmp_path / "t", scale="huge", seed=1)
@@ -151,6 +156,33 @@ def test_the_five_drives_are_what_the_demo_promises() -> None:
     assert [name for name, d in DRIVES.items() if d.bag] == ["de_gravel_offroad"]
     assert [name for name, d in DRIVES.items() if d.circuit] == ["it_town_revisit"]
     assert any(v == 0 for _, v in DRIVES["de_town_bumps"].speeds)
+    assert [name for name, d in DRIVES.items() if d.night] == ["it_zero_shot"]
+
+
+def test_the_loop_is_600_m_driven_once_and_a_little_more() -> None:
+    drive = drive_named("it_town_loop")
+    assert drive.circuit is not None
+    length = circuit(*drive.circuit).length
+    assert length == pytest.approx(600, abs=5)
+    size = scale_named("full").cut(drive.lasts_s)
+    trip = course([(t + size.camera_start_s, v) for t, v in drive.speeds], 0.0, size.duration_s)
+    assert 1.05 * length < trip.at(size.duration_s) < 1.3 * length
+    assert 60 <= size.duration_s <= 80
+    speed = np.diff(trip.s) / np.diff(trip.t)
+    assert 8 <= speed.min() <= speed.max() <= 10 + 1e-6
+
+
+def test_cars_carry_their_headlights_where_their_mesh_has_lamps(world: World) -> None:
+    assert len(world.cars) >= 2
+    for index in world.cars:
+        body = world.movers[index].mesh
+        lamps = body.vertices[np.unique(body.triangles[body.surface == Surface.LAMP])]
+        for place in HEADLIGHTS_M:
+            assert np.linalg.norm(lamps - place, axis=1).min() < 0.2
+    assert len(world.lamps) > 3
+    street = world.static.vertices[np.unique(world.static.triangles[world.static.surface == Surface.LAMP])]
+    gap = np.linalg.norm(world.lamps[:, None] - street, axis=2).min(axis=1)
+    assert gap.max() < 0.3
 
 
 def _hashes(root: Path) -> dict[str, str]:

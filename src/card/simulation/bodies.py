@@ -12,6 +12,9 @@ Array = NDArray[np.float64]
 
 CAR_LENGTH_M, CAR_WIDTH_M = 4.4, 1.8
 EYE_HEIGHT_M = 1.60
+#: (2, 3): where a car's headlights are in its own frame, and ours in ``rig``; they shine along y.
+HEADLIGHTS_M = np.array([[-0.66, 2.22, 0.73], [0.66, 2.22, 0.73]])
+EGO_HEADLIGHTS_M = np.array([[-0.7, 1.67, -1.0], [0.7, 1.67, -1.0]])
 _PLATE_GAP_M = 0.015
 
 #: Side view of a car: (y, z) of the body's outline and of the cabin on top of it.
@@ -19,8 +22,9 @@ _CAR_BODY = [(-2.2, 0.32), (-2.2, 0.85), (-1.9, 0.98), (1.0, 0.95), (2.0, 0.78),
 _CAR_CABIN = [(-1.95, 0.96), (-1.45, 1.42), (0.05, 1.45), (1.0, 0.94)]
 
 
-def car(colour: ArrayLike, plates: tuple[int, int]) -> Mesh:
-    """A car 4.4 m long whose front and rear plates are the things ``plates``."""
+def car(colour: ArrayLike, plates: tuple[int, int], *, lit: bool = True) -> Mesh:
+    """A car 4.4 m long whose front and rear plates are the things ``plates``, its lamps on or off."""
+    lamps = Surface.LAMP if lit else Surface.CAR_BODY
     half = CAR_WIDTH_M / 2
     parts = [
         _extruded(_CAR_BODY, half, half, Surface.CAR_BODY, colour),
@@ -34,9 +38,7 @@ def car(colour: ArrayLike, plates: tuple[int, int]) -> Mesh:
             parts.append(cylinder((side - 0.1, y, 0.33), (side + 0.1, y, 0.33), (0.33, 0.33), Surface.TYRE))
         for y, colour_lamp in ((-2.205, (1.0, 0.05, 0.05)), (2.205, (1.0, 1.0, 0.9))):
             x = 0.75 * side
-            parts.append(
-                box((x - 0.14, y - 0.01, 0.66), (x + 0.14, y + 0.01, 0.80), Surface.CAR_BODY, colour_lamp)
-            )
+            parts.append(box((x - 0.14, y - 0.01, 0.66), (x + 0.14, y + 0.01, 0.80), lamps, colour_lamp))
     return join(parts)
 
 

@@ -1,5 +1,6 @@
-"""The demo drives: what each one's world and trip are like."""
+"""The simulated drives, those of the demo and further ones: what each one's world and trip are like."""
 
+import math
 from dataclasses import dataclass
 
 from card.errors import CardError
@@ -24,6 +25,8 @@ class Drive:
     house_depth, tree_spacing : metres; 0 for none.
     crossing_s : when walkers cross before the car, s after the cameras start; None for never.
     walker_spacing : metres between walkers along the road.  oncoming_s, parked_spacing : s, m between cars.
+    night : dark, with street lamps and headlights.
+    lasts_s : no scale's recording is longer.
     bag : delivered as a rosbag2 with packets.
     """
 
@@ -45,6 +48,8 @@ class Drive:
     oncoming_s: float = 0.0
     parked_spacing: float = 0.0
     leader: bool = False
+    night: bool = False
+    lasts_s: float = math.inf
     bag: bool = False
 
     @property
@@ -130,8 +135,8 @@ DRIVES = {
         parked_spacing=35.0,
     ),
     "it_zero_shot": Drive(
-        session="2026-05-19-mid",
-        starts=13.0,
+        session="2026-05-19-end",
+        starts=20.5,
         country="IT",
         place="Villa Prova",
         section=ITALIAN_TOWN,
@@ -147,12 +152,59 @@ DRIVES = {
         oncoming_s=6.0,
         parked_spacing=20.0,
         leader=True,
+        night=True,
+    ),
+}
+
+
+#: What no demo shows: long enough, slow enough or dark enough to measure a stage on.
+FURTHER_DRIVES = {
+    # 600 m round a block and a little more, past other cars.
+    "it_town_loop": Drive(
+        session="2026-05-19-start",
+        starts=10.5,
+        country="IT",
+        place="Borgo Esempio",
+        section=ITALIAN_TOWN,
+        road_class="A",
+        speeds=((-6, 9.0), (0, 9.5), (10, 8.5), (18, 9.5), (34, 8.2), (44, 10.0), (60, 9.0)),
+        circuit=(205.0, 30.0),
+        bump_spacing=75.0,
+        pothole_spacing=60.0,
+        house_depth=7.0,
+        tree_spacing=30.0,
+        walker_spacing=40.0,
+        oncoming_s=6.0,
+        parked_spacing=22.0,
+        leader=True,
+        lasts_s=72.0,
+    ),
+    # Walking pace: a stop of five seconds, walkers along the car.
+    "de_town_slow": Drive(
+        session="2026-04-14-mid",
+        starts=11.5,
+        country="DE",
+        place="Musterstadt",
+        section=TOWN,
+        road_class="B",
+        speeds=((-5, 3.0), (0, 1.6), (6, 1.4), (8, 0.0), (13, 0.0), (16, 1.3), (30, 2.2), (45, 1.2)),
+        bend=0.012,
+        bump_spacing=18.0,
+        pothole_spacing=11.0,
+        house_depth=8.0,
+        tree_spacing=28.0,
+        crossing_s=10.0,
+        walker_spacing=6.0,
+        oncoming_s=7.0,
+        parked_spacing=18.0,
+        leader=True,
     ),
 }
 
 
 def drive_named(name: str) -> Drive:
-    """The drive of one of the demo's ids; CardError for another name."""
-    if name not in DRIVES:
-        raise CardError("unknown demo drive", found=name, wanted=", ".join(DRIVES))
-    return DRIVES[name]
+    """The drive with this id; CardError for another name."""
+    drives = DRIVES | FURTHER_DRIVES
+    if name not in drives:
+        raise CardError("unknown simulated drive", found=name, wanted=", ".join(drives))
+    return drives[name]

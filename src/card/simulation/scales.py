@@ -1,6 +1,6 @@
 """How much of a drive is simulated: the same code from a test in seconds to a day's drive."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from card.errors import CardError
 
@@ -22,6 +22,11 @@ class Scale:
     duration_s: float
     camera_start_s: float
     camera_duration_s: float
+
+    def cut(self, duration_s: float) -> "Scale":
+        """The same scale, nothing running longer than ``duration_s`` from the drive's start."""
+        cameras = max(0.0, min(self.camera_duration_s, duration_s - self.camera_start_s))
+        return replace(self, duration_s=min(self.duration_s, duration_s), camera_duration_s=cameras)
 
 
 SCALES = {

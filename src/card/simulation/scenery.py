@@ -24,9 +24,9 @@ def houses(road: Road, span: tuple[float, float], depth: float, rng: np.random.G
     return found
 
 
-def poles(road: Road, span: tuple[float, float], rng: np.random.Generator) -> list[Mesh]:
-    """Street lamps every 22 m or so, on alternating sides."""
-    found = []
+def poles(road: Road, span: tuple[float, float], rng: np.random.Generator) -> tuple[list[Mesh], list[Array]]:
+    """Street lamps every 22 m or so, on alternating sides: meshes, and where (3,) each one's light is."""
+    found, lights = [], []
     for index, s in enumerate(np.arange(span[0], span[1], 22.0)):
         side = -1.0 if index % 2 else 1.0
         offset = side * (road.section.half_width + 0.45)
@@ -34,10 +34,14 @@ def poles(road: Road, span: tuple[float, float], rng: np.random.Generator) -> li
             [
                 cylinder((0, 0, -0.3), (0, 0, 5.5), (0.07, 0.05), Surface.POLE),
                 cylinder((0, 0, 5.5), (-side * 1.2, 0, 5.7), (0.04, 0.04), Surface.POLE),
+                box((-side * 1.2 - 0.25, -0.1, 5.66), (-side * 1.2 + 0.25, 0.1, 5.74), Surface.POLE),
+                box((-side * 1.2 - 0.20, -0.08, 5.62), (-side * 1.2 + 0.20, 0.08, 5.66), Surface.LAMP),
             ]
         )
-        found.append(lamp.moved(road.pose(s + rng.uniform(-2, 2), offset)))
-    return found
+        pose = road.pose(s + rng.uniform(-2, 2), offset)
+        found.append(lamp.moved(pose))
+        lights.append(pose[:3, 3] + pose[:3, :3] @ [-side * 1.2, 0.0, 5.6])
+    return found, lights
 
 
 def trees(road: Road, span: tuple[float, float], spacing: float, rng: np.random.Generator) -> list[Mesh]:

@@ -28,16 +28,21 @@ class Surface(IntEnum):
     SKIN = 18
     FACE = 19
     BOARD = 20
+    LAMP = 21
 
 
 @dataclass(frozen=True)
 class Look:
-    """Albedo (linear RGB), contrast of the fine and coarse texture noise, LiDAR reflectivity 0 to 1."""
+    """Albedo (linear RGB), contrast of the fine and coarse texture noise, LiDAR reflectivity 0 to 1.
+
+    emission : light a lamp gives off at night, in units of a white surface in the sun.
+    """
 
     albedo: tuple[float, float, float]
     fine: float
     coarse: float
     reflectivity: float
+    emission: float = 0.0
 
 
 LOOKS = {
@@ -62,4 +67,5 @@ LOOKS = {
     Surface.SKIN: Look((0.55, 0.38, 0.29), 0.05, 0.05, 0.45),
     Surface.FACE: Look((1.0, 1.0, 1.0), 0.0, 0.0, 0.45),
     Surface.BOARD: Look((1.0, 1.0, 1.0), 0.0, 0.0, 0.60),
+    Surface.LAMP: Look((0.8, 0.8, 0.8), 0.0, 0.0, 0.60, emission=6.0),
 }

@@ -39,6 +39,7 @@ class Traffic:
     """Builds movers and parked cars while it keeps the list of things that carry labels.
 
     things : grows with each face and plate.  movers, parked : what was built.
+    cars : indices of the movers that are cars, their lamps on.
     """
 
     drive: Drive
@@ -49,6 +50,7 @@ class Traffic:
     things: list[Thing]
     movers: list[Mover] = field(default_factory=list)
     parked: list[Mesh] = field(default_factory=list)
+    cars: list[int] = field(default_factory=list)
 
     def populate(self, camera_start_s: float, duration_s: float) -> None:
         """Put everyone on the road of a drive of ``duration_s`` with cameras from ``camera_start_s``."""
@@ -125,10 +127,11 @@ class Traffic:
         """A parked car, half on the sidewalk, on the left more often than on the right."""
         side = -1.0 if self.rng.random() < 0.75 else 1.0
         pose = self.road.pose(s, side * (self.drive.section.half_width + 0.75), 0.0 if side > 0 else np.pi)
-        self.parked.append(self._car().moved(pose))
+        self.parked.append(self._car(lit=False).moved(pose))
 
     def _drive_along(self, way: Callable[[Array], tuple[Array, Array, Array]]) -> None:
-        self.movers.append(Mover(self._car(), self._path(way)))
+        self.cars.append(len(self.movers))
+        self.movers.append(Mover(self._car(lit=True), self._path(way)))
 
     def _walk(self, way: Callable[[Array], tuple[Array, Array, Array]], head_turn: float) -> None:
         colours = _COLOURS[self.rng.integers(0, len(_COLOURS), 2)] * self.rng.uniform(0.7, 1.2, (2, 1))
@@ -163,11 +166,11 @@ class Traffic:
         t_ns = self.start_ns + np.round(t * 1e9).astype(np.int64)
         return Trajectory(t_ns, pose[:, :3, 3], quaternion_from_matrix(pose[:, :3, :3]))
 
-    def _car(self) -> Mesh:
+    def _car(self, *, lit: bool) -> Mesh:
         colour = _COLOURS[self.rng.integers(0, len(_COLOURS))] * self.rng.uniform(0.8, 1.2)
         plate = plate_texture(self.drive.country, self.rng)
         self.things += [Thing("plate", plate), Thing("plate", plate)]
-        return car(colour, (len(self.things) - 2, len(self.things) - 1))
+        return car(colour, (len(self.things) - 2, len(self.things) - 1), lit=lit)
 
     def _when(self, s: float, duration_s: float) -> float:
         """When the car is about 5 m before arc length ``s``."""

@@ -34,7 +34,9 @@ class World:
     path : true ``world_from_rig`` at 1 kHz, beginning before and ending after the recording.
     static : the mesh of all that stands still.  movers : all that moves.
     things : what labels are drawn around; the first ones are the road's irregularities.
-    sun : (3,) unit vector towards it.
+    sun : (3,) unit vector towards it, or at night towards the moon.
+    lamps : (L, 3) where street lamps shine from; they are on at night.
+    cars : indices of the movers that are cars, their headlights on (`bodies.HEADLIGHTS_M`).
     """
 
     name: str
@@ -50,6 +52,8 @@ class World:
     movers: list[Mover]
     things: list[Thing]
     sun: Array
+    lamps: Array
+    cars: tuple[int, ...]
 
     def rng(self, purpose: str) -> np.random.Generator:
         """A random stream of its own for each purpose."""
@@ -65,6 +69,7 @@ def world_of(name: str, drive: Drive, size: Scale, seed: int) -> World:
     """The world of any drive, at a scale that may have a duration of its own."""
     day_ns = int(np.datetime64(drive.day, "ns").astype(np.int64))
     start_ns = day_ns + round(drive.starts * 3600) * 1_000_000_000
+    size = size.cut(drive.lasts_s)
     begin = size.camera_start_s
     where = course([(t + begin, v) for t, v in drive.speeds], 0.0, size.duration_s)
 
@@ -84,12 +89,11 @@ def world_of(name: str, drive: Drive, size: Scale, seed: int) -> World:
     road = road.placed(world_from_map)
     path = Trajectory(path.t_ns, *_parts(world_from_map @ path.at(path.t_ns)))
 
+    standing, lamps = _scenery(drive, road, _rng(seed, name, "scenery"))
     things = [Thing("bump" if isinstance(t, Bump) else "pothole") for t in road.irregularities]
     traffic = Traffic(drive, road, where, start_ns, _rng(seed, name, "traffic"), things)
     traffic.populate(begin, size.duration_s)
-    static = join(
-        [*_ground(road, where), *_scenery(drive, road, _rng(seed, name, "scenery")), *traffic.parked]
-    )
+    static = join([*_ground(road, where), *standing, *traffic.parked])
     light = _rng(seed, name, "light")
     azimuth, elevation = light.uniform(0, 2 * np.pi), np.radians(light.uniform(35, 60))
     sun = np.array(
@@ -97,7 +101,21 @@ def world_of(name: str, drive: Drive, size: Scale, seed: int) -> World:
     )
     rig = session_rig(drive.session, seed, size.name)
     return World(
-        name, drive, size, seed, rig, start_ns, road, where, path, static, traffic.movers, things, sun
+        name,
+        drive,
+        size,
+        seed,
+        rig,
+        start_ns,
+        road,
+        where,
+        path,
+        static,
+        traffic.movers,
+        things,
+        sun,
+        np.array(lamps).reshape(-1, 3),
+        tuple(traffic.cars),
     )
 
 
@@ -162,16 +180,19 @@ def _ground(road: Road, where: Course) -> list[Mesh]:
     return [road_mesh(road, fine, whole), land_mesh(road, road.xyz(s, 0 * s)[:, :2])]
 
 
-def _scenery(drive: Drive, road: Road, rng: np.random.Generator) -> list[Mesh]:
+def _scenery(drive: Drive, road: Road, rng: np.random.Generator) -> tuple[list[Mesh], list[Array]]:
+    """Meshes of what stands beside the road, and where its lamps are."""
     span = (road.line.start + 2, road.line.start + road.line.length - 2)
     found: list[Mesh] = []
+    lamps: list[Array] = []
     if drive.house_depth:
         found += scenery.houses(road, span, drive.house_depth, rng)
     if drive.section.kerb:
-        found += scenery.poles(road, span, rng)
+        masts, lamps = scenery.poles(road, span, rng)
+        found += masts
     if drive.tree_spacing:
         found += scenery.trees(road, span, drive.tree_spacing, rng)
-    return found
+    return found, lamps
 
 
 def _level(rig_from_map: Array) -> Array:
