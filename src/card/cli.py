@@ -1,12 +1,16 @@
-"""Command line: `card validate TREE`, `card splits extend`, `card summary`."""
+"""Command line: `card validate TREE`, `card splits extend`, `card summary`, and those of COMMANDS."""
 
 import argparse
 import logging
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
 
 from card.errors import CardError
+
+COMMANDS = ("card.packaging.commands.verify", "card.packaging.commands.extract")
+"""Modules of one command each, with `add`, which adds it to the parser."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -31,6 +35,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     summary = commands.add_parser("summary", help="what was released")
     summary.add_argument("release", type=Path, nargs="?", default=Path("results/release"))
     summary.set_defaults(run=_summary)
+
+    for module in COMMANDS:
+        import_module(module).add(commands)
 
     options = parser.parse_args(arguments)
     logging.basicConfig(format="%(message)s", level=logging.WARNING)

@@ -218,7 +218,7 @@ def _write_ground_truth(results: Path, rng: np.random.Generator) -> None:
     columns |= {"frame": list(range(FRAMES)), "points_saved": counts, "flag": ["complete"] * FRAMES}
     write_table(folder / "coverage.parquet", columns, "coverage")
     for frame, count in enumerate(counts):
-        points = rng.uniform(1, 5, size=(count, 3)).astype(np.float32)
+        points = rng.uniform((-1, -1, 3), (1, 1, 8), size=(count, 3)).astype(np.float32)
         np.savez(folder / f"{frame:06d}.npz", points=points)
     write_table(folder / "inventory.parquet", inventory(folder), "inventory")
 

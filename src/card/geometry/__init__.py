@@ -1,7 +1,8 @@
-"""Rigid transforms, trajectories and the camera model."""
+"""Rigid transforms, trajectories, the camera model and stereo rectification."""
 
 from card.geometry.camera import CameraModel
 from card.geometry.rasterize import rasterize
+from card.geometry.rectify import Rectification, pixel_map, rectify, remap
 from card.geometry.trajectory import Trajectory
 from card.geometry.transforms import (
     apply,
@@ -15,13 +16,17 @@ from card.geometry.transforms import (
 
 __all__ = [
     "CameraModel",
+    "Rectification",
     "Trajectory",
     "apply",
     "from_json",
     "inverse",
     "matrix_from_quaternion",
+    "pixel_map",
     "quaternion_from_matrix",
     "rasterize",
+    "rectify",
+    "remap",
     "to_json",
     "transform",
 ]
