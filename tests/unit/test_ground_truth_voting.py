@@ -1,14 +1,20 @@
+import dataclasses
 from collections import defaultdict
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from card.artifacts import default_settings
+from card.errors import CardError
 from card.geometry import Trajectory
+from card.ground_truth import voxel_map
 from card.ground_truth.quotas import meets_quotas, required_votes
-from card.ground_truth.views import distinct_views
-from card.ground_truth.voxel_map import build_voxel_map
-from card.ground_truth.voxels import VoxelGrid
+from card.ground_truth.reference.views import distinct_views
+from card.ground_truth.reference.voxel_map import build_voxel_map as plain_voxel_map
+from card.ground_truth.voxel_map import VoxelMap, build_voxel_map
+from card.ground_truth.voxels import OFFSET_STEPS, VoxelGrid
 
 SETTINGS = default_settings("ground_truth")
 
@@ -84,8 +90,8 @@ def random_bursts(seed: int, centre: np.ndarray, speed: float):
 def test_voxel_map_equals_a_dict(seed, centre, speed):
     centre = np.array(centre)
     bursts, origins = random_bursts(seed, centre, speed)
-    grid = VoxelGrid.around(Trajectory([0, 1], np.stack([centre, centre]), [[1, 0, 0, 0]] * 2), 0.1)
-    built = build_voxel_map(bursts, origins, grid, SETTINGS, chunk_points=250)
+    grid = grid_round(centre)
+    built = build_voxel_map(bursts, origins, grid, SETTINGS)
 
     points, fronts, rears = defaultdict(list), defaultdict(list), defaultdict(list)
     for i, front, cloud in bursts:
@@ -100,8 +106,10 @@ def test_voxel_map_equals_a_dict(seed, centre, speed):
         cloud = np.array(points[key])
         assert built.counts[v] == len(cloud)
         corner = grid.corners(np.array([key]))[0]
-        assert built.centroids[v] + corner == pytest.approx(cloud.mean(axis=0), abs=1e-6)
-        assert built.extents[v] == pytest.approx(np.linalg.norm(np.ptp(cloud, axis=0)), abs=1e-6)
+        # A place is known to half a step, a distance to one.
+        step = 0.1 / OFFSET_STEPS
+        assert built.centroids[v] + corner == pytest.approx(cloud.mean(axis=0), abs=step / 2 + 1e-9)
+        assert built.extents[v] == pytest.approx(np.linalg.norm(np.ptp(cloud, axis=0)), abs=2 * step)
         front = greedy(fronts[key], origins, 0.03)
         rear = greedy(rears[key], origins, 0.03)
         b = spread(front, origins)
@@ -113,14 +121,74 @@ def test_voxel_map_equals_a_dict(seed, centre, speed):
     assert not built.keys.size or built.extents.max() <= 0.1 * np.sqrt(3) + 1e-6
 
 
-def test_the_map_does_not_depend_on_how_bursts_are_grouped():
-    bursts, origins = random_bursts(9, np.zeros(3), 0.05)
-    grid = VoxelGrid.around(Trajectory([0, 1], np.zeros((2, 3)), [[1, 0, 0, 0]] * 2), 0.1)
-    maps = [build_voxel_map(bursts, origins, grid, SETTINGS, chunk_points=n) for n in (1, 500, 10**9)]
-    for other in maps[1:]:
-        assert np.array_equal(
-            meets_quotas(maps[0].front_views, maps[0].rear_views, maps[0].baseline, SETTINGS),
-            meets_quotas(other.front_views, other.rear_views, other.baseline, SETTINGS),
-        )
-        assert np.array_equal(maps[0].counts, other.counts)
-        assert np.allclose(maps[0].centroids, other.centroids, atol=1e-6)
+def grid_round(centre: np.ndarray) -> VoxelGrid:
+    return VoxelGrid.around(Trajectory([0, 1], np.stack([centre, centre]), [[1, 0, 0, 0]] * 2), 0.1)
+
+
+def assert_same(one, other) -> None:
+    for field in dataclasses.fields(VoxelMap):
+        if field.name != "grid":
+            assert np.array_equal(getattr(one, field.name), getattr(other, field.name)), field.name
+
+
+@pytest.mark.parametrize("chunk_points", [1, 250, 10**9])
+@pytest.mark.parametrize("speed", [0.0, 0.005, 0.05, 0.3])
+def test_the_compiled_map_is_the_plain_one_however_that_groups_its_bursts(chunk_points, speed):
+    bursts, origins = random_bursts(9, np.zeros(3), speed)
+    built = build_voxel_map(bursts, origins, grid_round(np.zeros(3)), SETTINGS)
+    assert_same(built, plain_voxel_map(bursts, origins, built.grid, SETTINGS, chunk_points))
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.lists(
+        st.tuples(st.booleans(), st.lists(st.tuples(*[st.integers(-9, 9)] * 3), max_size=12)),
+        min_size=1,
+        max_size=25,
+    ),
+    st.lists(st.tuples(*[st.integers(-3, 3)] * 3), min_size=25, max_size=25),
+    st.sampled_from([(0.0, 0.0, 0.0), (-1e-7, 0.05, -0.05), (4e5, -5.3e6, 600.0)]),
+    st.sampled_from([0.01, 0.03, 0.2]),
+    st.sampled_from([{}, {"front_votes_max": 1, "rear_votes_max": 4}, {"baseline_far_m": 0.1}]),
+)
+def test_the_compiled_map_is_the_plain_one_on_any_bursts(clouds, places, centre, pitch, changed):
+    """Points on a coarse lattice: on faces of voxels, on both sides of zero, far away, many alike."""
+    grid, filled = grid_round(np.array(centre)), SETTINGS | changed
+    origins = np.array(places) * 0.02 + centre
+    bursts = [
+        (i, front, np.array(cloud, dtype=np.float64).reshape(-1, 3) * pitch + centre)
+        for i, (front, cloud) in enumerate(clouds)
+    ]
+    built = build_voxel_map(bursts, origins, grid, filled)
+    assert_same(built, plain_voxel_map(bursts, origins, grid, filled, chunk_points=20))
+
+
+def test_the_compiled_map_grows(monkeypatch):
+    monkeypatch.setattr(voxel_map, "_CHUNK", 1000)
+    rng = np.random.default_rng(0)
+    bursts = [(i, i % 2 == 0, rng.uniform(-8, 8, (30_000, 3))) for i in range(8)]
+    origins = rng.normal(0, 0.3, (8, 3))
+    built = build_voxel_map(bursts, origins, grid_round(np.zeros(3)), SETTINGS)
+    assert len(built.keys) > 1 << 17
+    assert_same(built, plain_voxel_map(bursts, origins, built.grid, SETTINGS))
+
+
+def test_sums_of_offsets_go_beyond_32_bits():
+    bursts = [(i, True, np.full((300_000, 3), 0.0999)) for i in range(5)]
+    built = build_voxel_map(bursts, np.zeros((5, 3)), grid_round(np.zeros(3)), SETTINGS)
+    assert built.counts.tolist() == [1_500_000]
+    assert built.centroids[0] == pytest.approx(np.full(3, 0.0999), abs=0.1 / OFFSET_STEPS)
+
+
+def test_no_points_make_an_empty_map():
+    nothing = [(0, True, np.empty((0, 3)))]
+    built = build_voxel_map(nothing, np.zeros((1, 3)), grid_round(np.zeros(3)), SETTINGS)
+    assert len(built.keys) == len(built.hit_by_both) == 0
+
+
+def test_a_point_outside_the_grid_is_an_error_of_the_compiled_map():
+    grid = grid_round(np.zeros(3))
+    for far in (-1500.0, 3e5):
+        cloud = np.array([[0.0, 0, 0], [0.0, far, 0]])
+        with pytest.raises(CardError, match="point outside the voxel grid"):
+            build_voxel_map([(0, True, cloud)], np.zeros((1, 3)), grid, SETTINGS)

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from card.ground_truth.views import distinct_views
-from card.ground_truth.voxels import VoxelGrid
+from card.ground_truth import voxel_table as table
+from card.ground_truth.voxels import OFFSET_STEPS, VoxelGrid, outside
 
-#: Points sorted at once; the result does not depend on it.
-CHUNK_POINTS = 2_000_000
+#: Voxels whose columns are made at once when a map is finished.
+_CHUNK = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -21,9 +21,10 @@ class VoxelMap:
     """All voxels of a drive, sorted by key.
 
     counts: (V,) int32 points. centroids: (V, 3) float32, metres from the voxel's lower corner.
-    extents: (V,) float32, diagonal of the bounding box of the points, metres.
-    front_views, rear_views: (V,) int32 distinct views, lower bounds above the largest quota.
-    baseline: (V,) float64, metres, lower bound above the far anchor.
+    extents: (V,) float32, diagonal of the bounding box of the points, metres. Both come from offsets in
+    whole 4096ths of a voxel, so that they do not depend on the order of the points.
+    front_views, rear_views: (V,) int32 distinct views; counting ends once no quota can fail any more.
+    baseline: (V,) float64, metres, of the front views counted.
     """
 
     grid: VoxelGrid
@@ -46,123 +47,108 @@ def build_voxel_map(
     origins: npt.NDArray[np.float64],
     grid: VoxelGrid,
     settings: Mapping[str, Any],
-    chunk_points: int = CHUNK_POINTS,
 ) -> VoxelMap:
     """The map of a drive's bursts, given in the fixed order (end time, sensor, index).
+
+    `reference.voxel_map` is the same in plain numpy. Memory: 64 bytes a voxel, and what its views take.
 
     Parameters
     ----------
     bursts : ordinal (increasing), whether it is the front LiDAR's, world points (N, 3) metres.
     origins : (B, 3) sensor origin of each ordinal in world, metres.
+
+    Raises
+    ------
+    CardError
+        If a point lies outside the grid.
     """
-    state = _State(origins, grid, settings)
-    pending: list[tuple[int, bool, npt.NDArray[np.float64]]] = []
-    points = 0
-    for burst in bursts:
-        pending.append(burst)
-        points += len(burst[2])
-        if points >= chunk_points:
-            state.add(pending)
-            pending, points = [], 0
-    if points:
-        state.add(pending)
+    state = _State(grid, settings)
+    for burst, front, points in bursts:
+        state.add(burst, front, points, origins)
     return state.finish()
 
 
 class _State:
-    def __init__(
-        self, origins: npt.NDArray[np.float64], grid: VoxelGrid, settings: Mapping[str, Any]
-    ) -> None:
-        self.origins, self.grid = origins, grid
-        self.spacing = settings["min_view_spacing_m"]
-        # (views, baseline) after which a sensor's quota can no longer fail; the rear has no baseline.
-        self.enough = {
-            True: (settings["front_votes_max"], settings["baseline_far_m"]),
-            False: (settings["rear_votes_max"], 0.0),
-        }
-        self.keys = np.empty(0, dtype=np.int64)
-        self.columns: dict[str, npt.NDArray[Any]] = {
-            "count": np.empty(0, dtype=np.int32),
-            "sum": np.empty((0, 3)),
-            "low": np.empty((0, 3), dtype=np.float32),
-            "high": np.empty((0, 3), dtype=np.float32),
-            "baseline": np.empty(0),
-            "views_front": np.empty(0, dtype=np.int32),
-            "views_rear": np.empty(0, dtype=np.int32),
-            "settled_front": np.empty(0, dtype=np.bool_),
-            "settled_rear": np.empty(0, dtype=np.bool_),
-        }
-        # (voxel, burst) pairs of the viewpoints accepted so far in voxels that are not settled.
-        empty = np.empty(0, dtype=np.int64)
-        self.pairs = {True: (empty, empty), False: (empty, empty)}
+    """Voxels in the order in which they were first hit; see `voxel_table`."""
 
-    def add(self, bursts: list[tuple[int, bool, npt.NDArray[np.float64]]]) -> None:
-        points = np.concatenate([p for _, _, p in bursts])
-        burst = np.repeat([b for b, _, _ in bursts], [len(p) for _, _, p in bursts])
-        front = np.repeat([f for _, f, _ in bursts], [len(p) for _, _, p in bursts])
-        keys = self.grid.keys(points)
-        order = np.argsort(keys, kind="stable")
-        keys, burst, front = keys[order], burst[order], front[order]
-        offsets = points[order] - self.grid.corners(keys)
-        starts = np.flatnonzero(np.r_[True, keys[1:] != keys[:-1]])
-        self._grow(keys[starts])
-        slots = np.searchsorted(self.keys, keys[starts])
-        c = self.columns
-        c["count"][slots] += np.diff(np.r_[starts, len(keys)]).astype(np.int32)
-        c["sum"][slots] += np.add.reduceat(offsets, starts)
-        c["low"][slots] = np.minimum(c["low"][slots], np.minimum.reduceat(offsets, starts))
-        c["high"][slots] = np.maximum(c["high"][slots], np.maximum.reduceat(offsets, starts))
-        slot_of_point = np.repeat(slots, np.diff(np.r_[starts, len(keys)]))
-        first_of_burst = np.r_[True, (keys[1:] != keys[:-1]) | (burst[1:] != burst[:-1])]
-        for is_front in (True, False):
-            new = first_of_burst & (front == is_front)
-            self._vote(is_front, slot_of_point[new], burst[new])
-
-    def _grow(self, keys: npt.NDArray[np.int64]) -> None:
-        merged = np.union1d(self.keys, keys)
-        old = np.searchsorted(merged, self.keys)
-        fills = {"low": np.inf, "high": -np.inf}
-        for name, column in self.columns.items():
-            grown = np.full((len(merged), *column.shape[1:]), fills.get(name, 0), dtype=column.dtype)
-            grown[old] = column
-            self.columns[name] = grown
-        self.pairs = {sensor: (old[slot], burst) for sensor, (slot, burst) in self.pairs.items()}
-        self.keys = merged
-
-    def _vote(self, front: bool, slot: npt.NDArray[np.int64], burst: npt.NDArray[np.int64]) -> None:
-        name = "front" if front else "rear"
-        c = self.columns
-        wanted = ~c[f"settled_{name}"][slot]
-        slot, burst = slot[wanted], burst[wanted]
-        touched = np.zeros(len(self.keys), dtype=np.bool_)
-        touched[slot] = True
-        old_slot, old_burst = self.pairs[front]
-        again = touched[old_slot]
-        slot = np.concatenate([old_slot[again], slot])
-        burst = np.concatenate([old_burst[again], burst])
-        order = np.lexsort((burst, slot))
-        voxels, local = np.unique(slot[order], return_inverse=True)
-        # Run again over what was accepted before, then what is new: the greedy outcome is the same.
-        enough, far = self.enough[front]
-        views = distinct_views(local, burst[order], self.origins, len(voxels), self.spacing, enough, far)
-        c[f"views_{name}"][voxels] = views.count
-        c[f"settled_{name}"][voxels] = views.settled
-        if front:
-            c["baseline"][voxels] = views.baseline
-        self.pairs[front] = (
-            np.concatenate([old_slot[~again], voxels[views.voxel]]),
-            np.concatenate([old_burst[~again], views.burst]),
+    def __init__(self, grid: VoxelGrid, settings: Mapping[str, Any]) -> None:
+        self._grid = grid
+        self._first = np.array(grid.first, dtype=np.int64)
+        self._gate = (
+            float(settings["min_view_spacing_m"]),
+            int(settings["front_votes_max"]),
+            int(settings["rear_votes_max"]),
+            float(settings["baseline_far_m"]),
         )
+        self._voxels = np.zeros(1 << 16, dtype=table.VOXEL)
+        self._views = np.zeros((1 << 14, 2), dtype=np.int32)
+        self._slots = np.full(1 << 17, -1, dtype=np.int32)
+        # Voxels and views in use.
+        self._used = np.zeros(2, dtype=np.int64)
+
+    def add(
+        self, burst: int, front: bool, points: npt.NDArray[np.float64], origins: npt.NDArray[np.float64]
+    ) -> None:
+        self._make_room(len(points))
+        bad = table.add_burst(
+            points, burst, front, origins, self._grid.size, self._first, *self._gate,
+            self._voxels, self._views, self._slots, self._used,
+        )  # fmt: skip
+        if bad >= 0:
+            raise outside(points[bad])
+
+    def _make_room(self, points: int) -> None:
+        voxels, views = int(self._used[0]) + points, int(self._used[1]) + points
+        # Growing in place moves pages, not bytes.
+        if voxels > len(self._voxels):
+            self._voxels.resize(voxels + voxels // 4, refcheck=False)
+        if views > len(self._views):
+            self._views.resize((views + views // 4, 2), refcheck=False)
+        if voxels > 0.65 * len(self._slots):
+            self._slots = np.full(len(self._slots) * 2, -1, dtype=np.int32)
+            table.index(self._voxels, int(self._used[0]), self._slots)
 
     def finish(self) -> VoxelMap:
-        c = self.columns
-        return VoxelMap(
-            grid=self.grid,
-            keys=self.keys,
-            counts=c["count"],
-            centroids=(c["sum"] / np.maximum(c["count"], 1)[:, None]).astype(np.float32),
-            extents=np.linalg.norm(c["high"] - c["low"], axis=1).astype(np.float32),
-            front_views=c["views_front"],
-            rear_views=c["views_rear"],
-            baseline=c["baseline"],
+        count = int(self._used[0])
+        self._slots = np.empty(0, dtype=np.int32)
+        self._views = np.empty((0, 2), dtype=np.int32)
+        voxels = self._voxels
+        voxels.resize(count, refcheck=False)
+        table.permute(voxels, np.argsort(voxels["key"]))
+        out = VoxelMap(
+            grid=self._grid,
+            keys=np.empty(count, dtype=np.int64),
+            counts=np.empty(count, dtype=np.int32),
+            centroids=np.empty((count, 3), dtype=np.float32),
+            extents=np.empty(count, dtype=np.float32),
+            front_views=np.empty(count, dtype=np.int32),
+            rear_views=np.empty(count, dtype=np.int32),
+            baseline=np.empty(count, dtype=np.float64),
         )
+        # From the end, giving back what is done: the columns and the records never exist together.
+        for start in range((count - 1) // _CHUNK * _CHUNK, -1, -_CHUNK):
+            part, to = voxels[start:], slice(start, start + _CHUNK)
+            out.keys[to] = part["key"]
+            out.counts[to] = part["count"]
+            sums = table.sums(part)
+            out.centroids[to] = centroids(sums, part["count"], self._grid.size)
+            spans = np.stack([part[f"high_{a}"].astype(np.int64) - part[f"low_{a}"] for a in "xyz"], axis=1)
+            out.extents[to] = extents(spans, self._grid.size)
+            out.front_views[to] = part["front_views"]
+            out.rear_views[to] = part["rear_views"]
+            out.baseline[to] = part["baseline"]
+            del part
+            voxels.resize(start, refcheck=False)
+        return out
+
+
+def centroids(
+    sums: npt.NDArray[np.int64], counts: npt.NDArray[np.int32], size: float
+) -> npt.NDArray[np.float32]:
+    """Metres (V, 3) from the lower corner, of sums (V, 3) of offsets; a step stands for its middle."""
+    return ((sums / counts[:, None] + 0.5) * (size / OFFSET_STEPS)).astype(np.float32)
+
+
+def extents(spans: npt.NDArray[np.int64], size: float) -> npt.NDArray[np.float32]:
+    """Metres (V,): diagonals of boxes of spans (V, 3) in steps."""
+    return (np.sqrt((spans**2).sum(axis=1)) * (size / OFFSET_STEPS)).astype(np.float32)

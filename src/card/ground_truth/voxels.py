@@ -14,6 +14,8 @@ from card.geometry import Trajectory
 AXIS_BITS = 21
 #: How far beyond the trajectory the grid begins; no return of an automotive LiDAR lies further away.
 MARGIN_M = 1000.0
+#: Steps an edge is divided into, where points of a voxel are summed: 24 um at 10 cm, a quarter of LAZ's.
+OFFSET_STEPS = 4096
 
 Keys = npt.NDArray[np.int64]
 Points = npt.NDArray[np.float64]
@@ -53,12 +55,13 @@ class VoxelGrid:
         """
         indices = np.floor(points / self.size).astype(np.int64) - np.array(self.first)
         if indices.size and (indices.min() < 0 or indices.max() >= 1 << AXIS_BITS):
-            raise CardError(
-                "point outside the voxel grid",
-                found=f"{np.abs(points).max():.0f} m",
-                wanted=f"within {MARGIN_M:.0f} m of the trajectory",
-            )
+            raise outside(points[((indices < 0) | (indices >= 1 << AXIS_BITS)).any(axis=1)][0])
         return indices
+
+    def steps(self, points: Points) -> npt.NDArray[np.int64]:
+        """Offsets (N, 3) of world points (N, 3) from their voxels' lower corners, in whole steps."""
+        at = points / self.size
+        return ((at - np.floor(at)) * OFFSET_STEPS).astype(np.int64)
 
     def keys(self, points: Points) -> Keys:
         """Keys (N,) of world points (N, 3)."""
@@ -67,6 +70,15 @@ class VoxelGrid:
     def corners(self, keys: Keys) -> Points:
         """Lower corners (N, 3) in world, metres, of keys (N,)."""
         return (unpack(keys) + np.array(self.first)) * self.size
+
+
+def outside(point: Points) -> CardError:
+    """The error for a point (3,) that no voxel of a grid holds."""
+    return CardError(
+        "point outside the voxel grid",
+        found=" ".join(f"{c:.0f}" for c in point) + " m",
+        wanted=f"within {MARGIN_M:.0f} m of the trajectory",
+    )
 
 
 def pack(indices: npt.NDArray[np.int64]) -> Keys:
