@@ -3,12 +3,10 @@
 import json
 from pathlib import Path
 
-import numpy as np
 import pytest
-from PIL import Image
 
 from card.annotations.import_labels import import_labels
-from card.artifacts import default_settings, read_table, write_table
+from card.artifacts import default_settings, read_table, write_report, write_table
 from card.errors import CardError
 
 TIMES = [1_000, 2_000, 3_000, 4_000]
@@ -17,14 +15,12 @@ GOOD = "0 0.5 0.5 0.2 0.1\n"
 
 @pytest.fixture
 def drive(tmp_path) -> Path:
-    """Four frames, numbered 10 to 13, of 100 x 80 px; nobody has labelled them."""
+    """Four frames, numbered 10 to 13, of 100 x 80 px; nobody has labelled them. No image is there."""
     recording = tmp_path / "town"
-    (recording / "camera_left").mkdir(parents=True)
     (recording / "annotations" / "labels").mkdir(parents=True)
     (recording / "annotations" / "classes.txt").write_text("positive\nnegative\n")
-    for t_ns in TIMES:
-        image = Image.fromarray(np.full((80, 100, 3), 90, np.uint8))
-        image.save(recording / "camera_left" / f"{t_ns}.jpg")
+    size = {"camera_left_width_px": 100, "camera_left_height_px": 80}
+    write_report(tmp_path / "ingest.report.json", stage="ingest", settings={}, inputs={}, counts=size)
     none = [None] * len(TIMES)
     columns = {
         "frame": [10, 11, 12, 13],
@@ -36,12 +32,15 @@ def drive(tmp_path) -> Path:
     return recording
 
 
-def run(recording: Path, **settings: object) -> tuple[list[dict], dict[int, str], dict]:
+def run(
+    recording: Path, off_road: bool = False, **settings: object
+) -> tuple[list[dict], dict[int, str], dict]:
     out = recording.parent / "results" / "town"
     import_labels(
-        recording=recording,
         annotations=recording / "annotations",
         frames=recording.parent / "frames.parquet",
+        ingest_report=recording.parent / "ingest.report.json",
+        off_road=off_road,
         labels=out / "labels.parquet",
         label_states=out / "label_states.parquet",
         issues=out / "annotation_issues.parquet",
@@ -85,6 +84,7 @@ def test_three_states_and_boxes_by_frame(drive):
         "boxes_negative": 1,
         "repairs": 0,
         "warnings": 0,
+        "off_road": 0,
     }
     assert report["gates"][0]["verdict"] == "pass"
 
@@ -157,8 +157,36 @@ def test_all_errors_are_counted_and_logged(drive, caplog):
     assert "9000.txt:0: orphan_label" in caplog.text
 
 
-def test_image_that_gives_no_size_is_an_error(drive):
-    write(drive, "labels/1000.txt", GOOD)
-    (drive / "camera_left" / "1000.jpg").write_bytes(b"no image")
-    with pytest.raises(CardError, match=r"1000.jpg: image size cannot be read"):
+def test_size_that_ingest_did_not_state_is_an_error(drive):
+    write_report(drive.parent / "ingest.report.json", stage="ingest", settings={}, inputs={}, counts={})
+    with pytest.raises(CardError, match=r"ingest.report.json: size of the left image is not stated"):
         run(drive)
+
+
+def test_off_road_flag_is_kept(drive):
+    _, _, report = run(drive, off_road=True)
+    assert report["counts"]["off_road"] == 1
+    assert any(note.startswith("off-road") for note in report["notes"])
+
+
+def test_other_formats_give_the_same_table_and_name_theirs(drive):
+    write(drive, "labels/1000.txt", GOOD)
+    expected, _, report = run(drive)
+    assert report["notes"] == ["labels in format yolo"]
+    (drive / "annotations" / "labels" / "1000.txt").unlink()
+    size = "<size><width>100</width><height>80</height></size>"
+    edges = "<xmin>40</xmin><ymin>36</ymin><xmax>60</xmax><ymax>44</ymax>"
+    thing = f"<object><name>positive</name><bndbox>{edges}</bndbox></object>"
+    write(drive, "1000.xml", f"<annotation><filename>1000.jpg</filename>{size}{thing}</annotation>")
+    boxes, _, report = run(drive)
+    assert report["notes"] == ["labels in format voc"]
+    assert boxes[0] == pytest.approx(expected[0])
+
+
+def test_format_of_the_setting_wins(drive):
+    write(drive, "labels/1000.txt", GOOD)
+    write(drive, "notes.json", "{}")
+    with pytest.raises(CardError, match=r"mixed_formats: found coco in notes.json, yolo in labels"):
+        run(drive)
+    boxes, _, _ = run(drive, format="yolo")
+    assert len(boxes) == 1

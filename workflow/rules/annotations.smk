@@ -5,6 +5,7 @@
 rule annotations:
     input:
         frames=rules.ingest.output.frames,
+        ingest_report=rules.ingest.output.report,
     output:
         labels="results/{id}/labels.parquet",
         label_states="results/{id}/label_states.parquet",
@@ -15,8 +16,8 @@ rule annotations:
     params:
         cfg=cfg("annotations"),
         code=code("annotations"),
+        row=row("off_road"),
         raw=raw_fingerprint(raw_folder, "annotations"),
-        recording=recording_folder,
         annotations=lambda wildcards: f"{raw_folder(wildcards)}/annotations",
     script:
         "../scripts/annotations.py"

@@ -7,9 +7,10 @@ from card.artifacts import logged
 
 with logged(Path(snakemake.log[0])):
     import_labels(
-        recording=Path(snakemake.params.recording),
         annotations=Path(snakemake.params.annotations),
         frames=Path(snakemake.input.frames),
+        ingest_report=Path(snakemake.input.ingest_report),
+        off_road=snakemake.params.row["off_road"],
         labels=Path(snakemake.output.labels),
         label_states=Path(snakemake.output.label_states),
         issues=Path(snakemake.output.issues),

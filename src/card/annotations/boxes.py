@@ -6,11 +6,8 @@ from dataclasses import dataclass
 
 from card.annotations.issues import Issue
 
-PIXEL_UNITS = 2
-"""A centre or size from here on is no share of an image but a number of pixels."""
-
 ROUNDING = 1e-9
-"""Overrun, as a share of the image, that adding centre and half the size makes by itself."""
+"""Share of a length by which changing units and adding centre and half the size are off by themselves."""
 
 
 @dataclass(frozen=True)
@@ -55,14 +52,12 @@ def checked_box(box: Box, rules: Rules, file: str, issues: list[Issue]) -> Box |
     if not all(map(math.isfinite, values)):
         issues.append(Issue(file, box.line, "not_finite", f"found {shown}"))
         return None
-    if any(abs(value) >= PIXEL_UNITS for value in values):
-        issues.append(Issue(file, box.line, "pixel_units", f"found {shown}, wanted shares of the image"))
-        return None
     if box.width <= 0 or box.height <= 0:
         issues.append(Issue(file, box.line, "no_extent", f"found size {box.width:g} x {box.height:g}"))
         return None
     box_cut = _cut(box, rules, file, issues)
-    if box_cut and min(box.width * rules.size[0], box.height * rules.size[1]) < rules.subpixel_px:
+    shorter = min(box.width * rules.size[0], box.height * rules.size[1])
+    if box_cut and shorter < rules.subpixel_px * (1 - ROUNDING):
         size = f"{box.width * rules.size[0]:.3g} x {box.height * rules.size[1]:.3g} px"
         issues.append(Issue(file, box.line, "subpixel_box", f"found {size}"))
     return box_cut

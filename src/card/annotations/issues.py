@@ -15,6 +15,7 @@ SEVERITIES = {
     # kept and listed for a person
     "near_duplicate": "warn",
     "subpixel_box": "warn",
+    "unmarked_image": "warn",
     # not importable
     "not_text": "error",
     "field_count": "error",
@@ -27,6 +28,19 @@ SEVERITIES = {
     "orphan_label": "error",
     "foreign_file": "error",
     "class_map": "error",
+    "other_camera": "error",
+    "wrong_size": "error",
+    "repeated_image": "error",
+    "name_mismatch": "error",
+    "syntax": "error",
+    "unsupported": "error",
+    "mixed_formats": "error",
+    "missing_field": "error",
+    "wrong_type": "error",
+    "not_a_box": "error",
+    "repeated_key": "error",
+    "repeated_id": "error",
+    "dangling_id": "error",
 }
 
 

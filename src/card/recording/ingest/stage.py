@@ -53,8 +53,9 @@ def ingest(
     files = sensor_files(recording, description, sequence)
     stamps: dict[str, npt.NDArray[np.int64]] = {}
     limits: dict[str, int] = {}
+    sizes: dict[str, tuple[int, int]] = {}
     for camera in (camera for camera in CAMERAS if camera in files):
-        check_images(camera, files[camera])
+        sizes[camera] = check_images(camera, files[camera])
         stamps[camera] = np.array([stamp_of(path) for path in files[camera]], dtype=np.int64)
         limits[camera] = settings["image_gap_ns"]
     sweeps: dict[str, BurstTimes] = {}
@@ -85,7 +86,7 @@ def ingest(
         sequence=sequence["id"],
         settings=settings,
         inputs={"recording": description_path(recording)},
-        counts=summary.counts(table, sweeps, stamps, listing),
+        counts=summary.counts(table, sizes, sweeps, stamps, listing),
         figures=summary.figures(table, gaps, stamps, coverage),
         gates=gates,
         notes=summary.notes(description),

@@ -15,12 +15,15 @@ from card.recording.paths import CAMERAS, LIDARS
 
 def counts(
     table: Mapping[str, list[Any]],
+    sizes: Mapping[str, tuple[int, int]],
     sweeps: Mapping[str, BurstTimes],
     stamps: Mapping[str, npt.NDArray[np.int64]],
     listing: Mapping[str, Sequence[Any]],
 ) -> dict[str, int]:
-    """Counts by name: frames, files, bytes, data of each sensor, frames that lack something."""
+    """Counts by name: frames, files, bytes, image sizes, data of each sensor, frames that lack something."""
     found = {"frames": len(table["frame"]), "files": len(listing["name"]), "bytes": sum(listing["size"])}
+    for camera, (width, height) in sizes.items():
+        found |= {f"{camera}_width_px": width, f"{camera}_height_px": height}
     found |= {f"{sensor}_stamps": len(t_ns) for sensor, t_ns in stamps.items()}
     found |= {f"{lidar}_points": int(times.points.sum()) for lidar, times in sweeps.items()}
     for name in ("right_file", *(f"{lidar}_burst" for lidar in LIDARS)):

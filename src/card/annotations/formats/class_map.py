@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from itertools import zip_longest
 from pathlib import Path
 
+from card.annotations.formats.text import read_lines
 from card.annotations.issues import Issue
-from card.annotations.text import read_lines
 
 # labelImg writes its map into the folder of the labels.
 PLACES = ("classes.txt", "labels/classes.txt")
