@@ -10,14 +10,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from card.artifacts import atomic_folder, write_json
-from card.simulation.bodies import ego_body
 from card.simulation.calibrations import delivered_calibration, true_calibration
 from card.simulation.deliveries import write_trajectory
 from card.simulation.drives import drive_named
-from card.simulation.raycast import Scene, Tracer
-from card.simulation.rig import LIDARS
+from card.simulation.record import write_sweeps
 from card.simulation.scales import scale_named
-from card.simulation.simulate import write_bursts, write_description, write_motion
+from card.simulation.simulate import write_description, write_motion
 from card.simulation.world import world_of
 
 OUT = Path(__file__).resolve().parent / "out" / "field"
@@ -50,7 +48,7 @@ class Field:
         return self.folder / "delivered.json"
 
 
-def field_drive(drive: str, seed: int, seconds: float, out: Path = OUT) -> Field:
+def field_drive(drive: str, seed: int, seconds: float, out: Path = OUT, threads: int = 2) -> Field:
     """Simulate `seconds` of a drive at full scale: both LiDARs, IMU, delivered trajectory and truth."""
     folder = out / f"{drive}-{seed}-{seconds:g}s"
     if not folder.is_dir():
@@ -61,9 +59,7 @@ def field_drive(drive: str, seed: int, seconds: float, out: Path = OUT) -> Field
             field.recording.mkdir()
             field.truth.mkdir()
             path = write_motion(world, field.recording, field.truth)
-            tracer, ego = Tracer(world.static, world.movers), Scene(ego_body())
-            for lidar in LIDARS:
-                write_bursts(world, tracer, ego, lidar, field.recording, field.truth)
+            write_sweeps(world, field.recording, field.truth, threads)
             write_description(world, field.recording, cameras=())
             write_trajectory(field.recording, path, seed)
             session = world.drive.session

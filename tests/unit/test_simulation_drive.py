@@ -129,8 +129,8 @@ def test_hidden_features_get_no_box(world: World) -> None:
     assert road_boxes(nothing, world.road, camera, np.eye(4)) == []
 
 
-def test_same_seed_same_bytes(folder: Path, tmp_path: Path) -> None:
-    simulate_drive(DRIVE, recording=tmp_path / "r", truth=tmp_path / "t", scale="tiny", seed=5)
+def test_same_seed_same_bytes_by_however_many_processes(folder: Path, tmp_path: Path) -> None:
+    simulate_drive(DRIVE, recording=tmp_path / "r", truth=tmp_path / "t", scale="tiny", seed=5, threads=2)
     assert _hashes(tmp_path / "r") == _hashes(folder / "recording")
     assert _hashes(tmp_path / "t") == _hashes(folder / "truth")
 

@@ -133,6 +133,18 @@ def test_ranges_on_a_plane_in_closed_form(standing: World, name: str) -> None:
     assert error.std() == pytest.approx(np.hypot(NOISE_M, RESOLUTION_M / np.sqrt(12)), rel=0.05)
 
 
+def test_every_channel_fires_from_where_the_car_is_at_its_own_time() -> None:
+    world = build_world("it_town_revisit", "tiny", 1)
+    lidar = Lidar(world, Tracer(plane(-1.7), []), Scene(ego_body()), "lidar_rear")
+    fired, _ = columns(90, 3)
+    t_ns = world.start_ns + 2_000_000_000 + fired
+    rays = np.random.default_rng(0).normal(size=(len(fired) * CHANNELS, 3))
+    origins, turned = lidar._in_world(t_ns, np.array([0.0, -1.95, 0.16]), rays)
+    pose = world.path.at(t_ns.repeat(CHANNELS) + np.tile(np.arange(CHANNELS), len(fired)) * CHANNEL_NS)
+    np.testing.assert_allclose(turned, np.einsum("nij,nj->ni", pose[:, :3, :3], rays), atol=3e-7)
+    np.testing.assert_allclose(origins, apply(pose, np.array([0.0, -1.95, 0.16])[None]), atol=3e-7)
+
+
 def test_own_roof_hides_the_road_behind(standing: World) -> None:
     tracer = Tracer(standing.static, [])
     hidden = Lidar(standing, tracer, Scene(ego_body()), "lidar_front").scan(standing.start_ns, 0)[0]

@@ -12,4 +12,5 @@ with logged(Path(snakemake.log[0])):
         truth=Path(snakemake.params.truth),
         scale=snakemake.params.cfg["scale"],
         seed=snakemake.params.cfg["seed"],
+        threads=snakemake.threads,
     )

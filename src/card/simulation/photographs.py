@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from card.artifacts import progress, write_table
+from card.artifacts import write_table
 from card.recording.paths import image_path
 from card.simulation.camera import Camera
 from card.simulation.labels import CLASSES, Box, private_boxes, road_boxes, yolo_lines
@@ -19,28 +19,48 @@ _QUALITY = 92
 #: One image in so many was not looked at by the annotators.
 _UNREVIEWED_EVERY = 7
 
+#: Camera, time in ns, and a box in its image.
+Shown = tuple[str, int, Box]
 
-def write_photographs(world: World, tracer: Tracer, ego: Scene, recording: Path, truth: Path) -> None:
-    """Images of both cameras, ``annotations/``, ``privacy_labels.csv``, and the truth's ``boxes.parquet``."""
-    shader = Shader(tracer, world.things, world.drive.section, world.sun)
+
+def exposures(world: World, camera: str) -> list[int]:
+    """Times (ns) of all images of a camera."""
     first = world.start_ns + round(world.scale.camera_start_s * 1e9)
-    times = [first + k * _FRAME_NS for k in range(round(world.scale.camera_duration_s * 10))]
-    found: list[tuple[str, int, Box]] = []
-    for name in CAMERAS:
+    first += STEREO_DELAY_NS if camera == "camera_right" else 0
+    return [first + k * _FRAME_NS for k in range(round(world.scale.camera_duration_s * 10))]
+
+
+class Photographer:
+    """Both cameras of a world's car."""
+
+    def __init__(self, world: World, tracer: Tracer, ego: Scene) -> None:
+        self._world, self._tracer = world, tracer
+        self._shader = Shader(tracer, world.things, world.drive.section, world.sun)
+        self._cameras = {
+            name: Camera(world.rig.cameras[name], world.rig.rig_from[name], ego, world.sun)
+            for name in CAMERAS
+        }
+
+    def photograph(self, name: str, numbers: range, recording: Path) -> list[Shown]:
+        """Write images ``numbers`` of one camera; what a label could be drawn around in them."""
+        world, found = self._world, []
         model, pose = world.rig.cameras[name], world.rig.rig_from[name]
-        camera, noise = Camera(model, pose, ego, world.sun), world.rng(f"noise of {name}")
-        delay = STEREO_DELAY_NS if name == "camera_right" else 0
-        (recording / name).mkdir(parents=True)
-        for t_ns in progress([t + delay for t in times], f"{world.name} {name}"):
+        for number in numbers:
+            t_ns, noise = exposures(world, name)[number], world.rng(f"noise of {name} {number}")
             world_from_rig = world.path.at(t_ns)
-            picture = camera.shoot(tracer, shader, world_from_rig, t_ns, noise)
+            picture = self._cameras[name].shoot(self._tracer, self._shader, world_from_rig, t_ns, noise)
             Image.fromarray(picture.rgb).save(
                 image_path(recording, name, t_ns), quality=_QUALITY, subsampling="4:2:0"
             )
             boxes = private_boxes(picture.thing, world.things)
             boxes += road_boxes(picture.thing, world.road, model, world_from_rig @ pose)
             found += [(name, t_ns, box) for box in boxes]
-    _write_annotations(world, times, found, recording / "annotations")
+        return found
+
+
+def write_labels(world: World, found: list[Shown], recording: Path, truth: Path) -> None:
+    """``annotations/``, ``privacy_labels.csv`` and the truth's ``boxes.parquet`` of all images."""
+    _write_annotations(world, found, recording / "annotations")
     _write_privacy_labels(found, recording / "privacy_labels.csv")
     columns = {
         "camera": [name for name, _, _ in found],
@@ -50,13 +70,11 @@ def write_photographs(world: World, tracer: Tracer, ego: Scene, recording: Path,
     write_table(truth / "boxes.parquet", columns, "truth_boxes")
 
 
-def _write_annotations(
-    world: World, times: list[int], found: list[tuple[str, int, Box]], folder: Path
-) -> None:
+def _write_annotations(world: World, found: list[Shown], folder: Path) -> None:
     (folder / "labels").mkdir(parents=True)
     (folder / "classes.txt").write_text("".join(f"{name}\n" for name in CLASSES), encoding="utf-8")
     model = world.rig.cameras["camera_left"]
-    for index, t_ns in enumerate(times):
+    for index, t_ns in enumerate(exposures(world, "camera_left")):
         if index % _UNREVIEWED_EVERY == _UNREVIEWED_EVERY - 3:
             continue
         boxes = [b for name, t, b in found if name == "camera_left" and t == t_ns and b.kind in CLASSES]
@@ -64,7 +82,7 @@ def _write_annotations(
         (folder / "labels" / f"{t_ns}.txt").write_text(text, encoding="utf-8")
 
 
-def _write_privacy_labels(found: list[tuple[str, int, Box]], path: Path) -> None:
+def _write_privacy_labels(found: list[Shown], path: Path) -> None:
     lines = ["camera,t_ns,kind,x_min,y_min,x_max,y_max"]
     for name, t_ns, box in found:
         if box.kind not in CLASSES:

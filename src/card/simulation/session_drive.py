@@ -3,13 +3,11 @@
 from dataclasses import replace
 from pathlib import Path
 
-from card.simulation.bodies import ego_body
 from card.simulation.calibrations import day_of
 from card.simulation.drives import DRIVES, TOWN, Drive
-from card.simulation.raycast import Scene, Tracer
-from card.simulation.rig import LIDARS
+from card.simulation.record import write_sweeps
 from card.simulation.scales import scale_named
-from card.simulation.simulate import write_bursts, write_description, write_motion
+from card.simulation.simulate import write_description, write_motion
 from card.simulation.world import world_of
 
 DURATION_S = {"tiny": 0.5, "demo": 4.0, "full": 60.0}
@@ -19,10 +17,13 @@ DURATION_S = {"tiny": 0.5, "demo": 4.0, "full": 60.0}
 _HOURS = {"start": 8.75, "mid": 12.75, "end": 17.75}
 
 
-def write_session_drive(session: str, *, folder: Path, truth: Path, scale: str, seed: int) -> None:
+def write_session_drive(
+    session: str, *, folder: Path, truth: Path, scale: str, seed: int, threads: int = 1
+) -> None:
     """Write a session's drive: LiDARs, IMU and recording.yaml to `folder`, its truth to `truth`.
 
     The car goes round a block and over bumps, so that every axis of the IMU is excited.
+    threads : processes that share the work; the bytes do not depend on it.
     """
     day, part = day_of(session)
     drive = Drive(
@@ -42,7 +43,5 @@ def write_session_drive(session: str, *, folder: Path, truth: Path, scale: str, 
     folder.mkdir(parents=True)
     truth.mkdir(parents=True)
     write_motion(world, folder, truth)
-    tracer, ego = Tracer(world.static, world.movers), Scene(ego_body())
-    for lidar in LIDARS:
-        write_bursts(world, tracer, ego, lidar, folder, truth)
+    write_sweeps(world, folder, truth, threads)
     write_description(world, folder, cameras=())

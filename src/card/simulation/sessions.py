@@ -33,12 +33,15 @@ _VIEW_NS = 2_000_000_000
 _SWEEP_LEAD_NS = PERIOD_NS // 2
 
 
-def simulate_session(session: str, *, folder: Path, truth: Path, scale: str, seed: int) -> None:
+def simulate_session(
+    session: str, *, folder: Path, truth: Path, scale: str, seed: int, threads: int = 1
+) -> None:
     """Write one session.
 
     folder : gets board.yaml, camera_left|camera_right/<t_ns>.jpg, lidar_front/<t_ns>.laz, calibration.json
         (what the team delivers), ego_mask.png, drive/ (both LiDARs, the IMU, recording.yaml).
     truth : gets calibration.json, board_poses.json and the drive's truth in drive/.
+    threads : processes that share the drive's work; the bytes do not depend on it.
     """
     size, rig = scale_named(scale), session_rig(session, seed, scale)
     rng = np.random.default_rng([seed, *session.encode()])
@@ -64,7 +67,12 @@ def simulate_session(session: str, *, folder: Path, truth: Path, scale: str, see
         poses = {"schema": "board_poses", "views": views, "stations": []}
         write_json(truth_partial / "board_poses.json", poses, "board_poses")
         write_session_drive(
-            session, folder=partial / "drive", truth=truth_partial / "drive", scale=scale, seed=seed
+            session,
+            folder=partial / "drive",
+            truth=truth_partial / "drive",
+            scale=scale,
+            seed=seed,
+            threads=threads,
         )
 
 

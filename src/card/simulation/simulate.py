@@ -7,22 +7,20 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from card.artifacts import atomic_folder, check, progress, write_arrays, write_table
+from card.artifacts import atomic_folder, check, write_arrays, write_table
 from card.geometry import Trajectory
-from card.recording.laz import write_burst
-from card.recording.paths import burst_path, imu_path
-from card.simulation.bodies import ego_body
+from card.recording.paths import imu_path
 from card.simulation.deliveries import as_bag, write_trajectory
 from card.simulation.footprint import wheel_contacts
 from card.simulation.imu import ImuErrors, imu_times, measured_imu
-from card.simulation.lidar import Lidar, burst_starts
-from card.simulation.photographs import write_photographs
-from card.simulation.raycast import Scene, Tracer
+from card.simulation.record import write_photographs, write_sweeps
 from card.simulation.rig import CAMERAS, LIDARS, WHEELS
 from card.simulation.world import World, build_world
 
 
-def simulate_drive(drive: str, *, recording: Path, truth: Path, scale: str, seed: int) -> None:
+def simulate_drive(
+    drive: str, *, recording: Path, truth: Path, scale: str, seed: int, threads: int = 1
+) -> None:
     """Write the raw recording of a demo drive to ``recording`` and its truth to ``truth``.
 
     Parameters
@@ -30,6 +28,7 @@ def simulate_drive(drive: str, *, recording: Path, truth: Path, scale: str, seed
     drive : id of one of `drives.DRIVES`.
     scale : ``tiny``, ``demo`` or ``full``.
     seed : makes the world; the same seed gives the same bytes.
+    threads : processes that share the sensors' work; the bytes do not depend on it.
 
     Raises
     ------
@@ -40,10 +39,8 @@ def simulate_drive(drive: str, *, recording: Path, truth: Path, scale: str, seed
     with atomic_folder(truth) as truth_part, atomic_folder(recording) as recording_part:
         native = recording_part / "native" if world.drive.bag else recording_part
         path = write_motion(world, native, truth_part)
-        tracer, ego = Tracer(world.static, world.movers), Scene(ego_body())
-        for lidar in LIDARS:
-            write_bursts(world, tracer, ego, lidar, native, truth_part)
-        write_photographs(world, tracer, ego, native, truth_part)
+        write_sweeps(world, native, truth_part, threads)
+        write_photographs(world, native, truth_part, threads)
         write_description(world, native)
         if world.drive.bag:
             as_bag(native, recording_part)
@@ -74,18 +71,6 @@ def write_motion(world: World, recording: Path, truth: Path) -> Trajectory:
         "truth_world",
     )
     return path
-
-
-def write_bursts(world: World, tracer: Tracer, ego: Scene, lidar: str, recording: Path, truth: Path) -> None:
-    """All sweeps of one LiDAR, and for each what its points really met."""
-    sensor = Lidar(world, tracer, ego, lidar)
-    (recording / lidar).mkdir(parents=True)
-    starts = burst_starts(lidar, world.start_ns, world.scale.duration_s)
-    for number, t_ns in enumerate(progress(starts, f"{world.name} {lidar}")):
-        burst, met = sensor.scan(t_ns, number)
-        write_burst(burst_path(recording, lidar, t_ns), burst)
-        arrays = {"dynamic": met.dynamic, "range_m": met.range_m, "surface": met.surface}
-        write_arrays(truth / "bursts" / lidar / f"{t_ns}.npz", arrays, "truth_burst")
 
 
 def write_description(world: World, recording: Path, cameras: Sequence[str] = CAMERAS) -> None:
