@@ -13,8 +13,9 @@ FLOORS: dict[str, set[str]] = {
     "recording": GROUND,
     "simulation": GROUND | {"recording"},
     "estimation": GROUND | {"recording"},
+    "detection": GROUND,
     **{
-        stage: GROUND | {"recording", "estimation"}
+        stage: GROUND | {"recording", "estimation", "detection"}
         for stage in (
             "calibration",
             "poses",
