@@ -35,14 +35,22 @@ class CentreLine:
         xy -= xy[origin]
         c, si = np.cos(heading[origin]), np.sin(heading[origin])
         xy = xy @ np.array([[c, -si], [si, c]])
+        middles = s[:-1] + STEP_M / 2
+        around = np.concatenate([k[-3:], k, k[:3]]) if closed else np.pad(k, 3, mode="edge")
+        self._bend = CubicSpline(middles[0] + STEP_M * np.arange(-3, len(k) + 3), around)
         self._curve = CubicSpline(s, xy, bc_type="periodic" if closed else "not-a-knot")
 
     def at(self, s: ArrayLike, derivative: int = 0) -> Array:
         """Position (..., 2) in metres, or its 1st or 2nd derivative by arc length."""
+        return np.asarray(self._curve(self._wrapped(s), derivative))
+
+    def curvature(self, s: ArrayLike) -> Array:
+        """Curvature (...) in 1/m, left positive."""
+        return np.asarray(self._bend(self._wrapped(s)))
+
+    def _wrapped(self, s: ArrayLike) -> Array:
         s = np.asarray(s, dtype=np.float64)
-        if self.closed:
-            s = self.start + np.mod(s - self.start, self.length)
-        return np.asarray(self._curve(s, derivative))
+        return self.start + np.mod(s - self.start, self.length) if self.closed else s
 
     def offset(self, s: ArrayLike, d: ArrayLike) -> Array:
         """Points (..., 2) at lateral offset d (m, right positive)."""

@@ -6,12 +6,18 @@ from dataclasses import dataclass
 from card.errors import CardError
 from card.simulation.road import CrossSection
 
-TOWN = CrossSection(half_width=3.6, side_width=2.8, kerb=0.12, side_slope=-0.02, lane=1.75, paved=True)
-ITALIAN_TOWN = CrossSection(
-    half_width=3.4, side_width=2.2, kerb=0.10, side_slope=-0.02, lane=1.65, paved=True
+TOWN = CrossSection(
+    half_width=3.6, side_width=2.8, kerb=0.12, side_slope=-0.02, lane=1.75, paved=True, bank=0.025
 )
-RURAL = CrossSection(half_width=2.9, side_width=4.0, kerb=0.0, side_slope=-0.07, lane=1.45, paved=True)
-TRACK = CrossSection(half_width=2.2, side_width=4.0, kerb=0.0, side_slope=-0.04, lane=0.2, paved=False)
+ITALIAN_TOWN = CrossSection(
+    half_width=3.4, side_width=2.2, kerb=0.10, side_slope=-0.02, lane=1.65, paved=True, bank=0.025
+)
+RURAL = CrossSection(
+    half_width=2.9, side_width=4.0, kerb=0.0, side_slope=-0.07, lane=1.45, paved=True, bank=0.05
+)
+TRACK = CrossSection(
+    half_width=2.2, side_width=4.0, kerb=0.0, side_slope=-0.04, lane=0.2, paved=False, bank=0.03, ruts=0.04
+)
 
 
 @dataclass(frozen=True)
@@ -21,7 +27,7 @@ class Drive:
     session : its calibration session.  starts : time of day, h UTC.
     bend : largest curvature of an open road, 1/m; ``circuit`` (straight m, radius m) makes a closed one.
     road_class : ISO 8608.  speeds : knots (s after the cameras start, m/s).
-    bump_spacing, pothole_spacing : metres from one to the next; 0 for none.
+    bump_spacing, pothole_spacing, patch_spacing, manhole_spacing : metres from one to the next; 0 for none.
     house_depth, tree_spacing : metres; 0 for none.
     crossing_s : when walkers cross before the car, s after the cameras start; None for never.
     walker_spacing : metres between walkers along the road.  oncoming_s, parked_spacing : s, m between cars.
@@ -41,6 +47,8 @@ class Drive:
     circuit: tuple[float, float] | None = None
     bump_spacing: float = 0.0
     pothole_spacing: float = 0.0
+    patch_spacing: float = 0.0
+    manhole_spacing: float = 0.0
     house_depth: float = 0.0
     tree_spacing: float = 0.0
     crossing_s: float | None = None
@@ -80,6 +88,8 @@ DRIVES = {
         bend=0.012,
         bump_spacing=42.0,
         pothole_spacing=95.0,
+        patch_spacing=19.0,
+        manhole_spacing=31.0,
         house_depth=8.0,
         tree_spacing=28.0,
         crossing_s=2.9,
@@ -93,10 +103,11 @@ DRIVES = {
         country="DE",
         place="Landkreis Musterland",
         section=RURAL,
-        road_class="C",
+        road_class="D",
         speeds=((-4, 7.0), (0, 4.0), (5, 3.5), (9, 7.0), (20, 7.5), (24, 2.0), (27, 2.0), (32, 7.0)),
         bend=0.015,
         pothole_spacing=7.0,
+        patch_spacing=13.0,
         tree_spacing=9.0,
         walker_spacing=45.0,
         oncoming_s=11.0,
@@ -127,6 +138,8 @@ DRIVES = {
         circuit=(62.0, 15.0),
         bump_spacing=52.0,
         pothole_spacing=61.0,
+        patch_spacing=23.0,
+        manhole_spacing=27.0,
         house_depth=5.0,
         tree_spacing=30.0,
         crossing_s=3.0,
@@ -145,6 +158,8 @@ DRIVES = {
         bend=0.010,
         bump_spacing=58.0,
         pothole_spacing=19.0,
+        patch_spacing=17.0,
+        manhole_spacing=33.0,
         house_depth=7.0,
         tree_spacing=18.0,
         crossing_s=3.5,
@@ -171,6 +186,8 @@ FURTHER_DRIVES = {
         circuit=(205.0, 30.0),
         bump_spacing=75.0,
         pothole_spacing=60.0,
+        patch_spacing=40.0,
+        manhole_spacing=35.0,
         house_depth=7.0,
         tree_spacing=30.0,
         walker_spacing=40.0,
@@ -191,6 +208,8 @@ FURTHER_DRIVES = {
         bend=0.012,
         bump_spacing=18.0,
         pothole_spacing=11.0,
+        patch_spacing=14.0,
+        manhole_spacing=25.0,
         house_depth=8.0,
         tree_spacing=28.0,
         crossing_s=10.0,

@@ -7,13 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from card.geometry import CameraModel, apply, inverse
-from card.simulation.irregularities import Irregularity, Pothole
+from card.simulation.irregularities import Irregularity
 from card.simulation.road import Road
 from card.simulation.traffic import Thing
 
 Array = NDArray[np.float64]
 
 CLASSES = ("positive", "negative")
+_LABELLED = {"bump": "positive", "pothole": "negative"}
 #: What is smaller than this nobody labels: visible pixels and a box's shorter side.
 _FEWEST_PX, _SMALLEST_BOX_PX = 12, 3.0
 _OUTLINE_STEPS = 25
@@ -64,7 +65,7 @@ def road_boxes(
     boxes = []
     for index, thing in enumerate(road.irregularities):
         visible = int(np.count_nonzero(seen == index))
-        if visible < _FEWEST_PX:
+        if thing.kind not in _LABELLED or visible < _FEWEST_PX:
             continue
         points = apply(inverse(world_from_camera), outline(road, thing))
         # The lens model folds back far outside the image: keep to what is in front and near the view.
@@ -74,7 +75,7 @@ def road_boxes(
         pixels = camera.project(ahead)
         x_min, y_min = np.maximum(pixels.min(axis=0), -0.5)
         x_max, y_max = np.minimum(pixels.max(axis=0), (camera.width - 0.5, camera.height - 0.5))
-        kind = CLASSES[isinstance(thing, Pothole)]
+        kind = _LABELLED[thing.kind]
         box = Box(kind, index, float(x_min), float(y_min), float(x_max), float(y_max), visible)
         if _worth_labelling(box):
             boxes.append(box)

@@ -13,6 +13,10 @@ from card.simulation.spectrum import Roughness
 Array = NDArray[np.float64]
 
 CROWN_SLOPE = 0.025
+#: Curvature (1/m) at which a bend is banked to 76 % of what is built.
+BANK_CURVATURE = 0.012
+#: Half the distance between the ruts of an unpaved track, and how wide they are (one sigma).
+_RUT_OFFSET_M, _RUT_WIDTH_M = 0.84, 0.3
 KERB_RUN_M = 0.03
 
 
@@ -26,6 +30,8 @@ class CrossSection:
     side_slope : rise of the side per metre outward.
     lane : offset of the right lane's middle.
     paved : asphalt or gravel.
+    bank : largest cross slope in a bend.
+    ruts : depth of two wheel tracks around ``lane``.
     """
 
     half_width: float
@@ -34,19 +40,36 @@ class CrossSection:
     side_slope: float
     lane: float
     paved: bool
+    bank: float = 0.0
+    ruts: float = 0.0
 
     @property
     def reach(self) -> float:
         """Offset at which the road's own mesh ends."""
         return self.half_width + self.side_width
 
-    def height(self, d: Array) -> Array:
-        """Crown, kerb and side (...) in metres, zero in the middle of the road."""
+    @property
+    def tilt_m(self) -> float:
+        """By how much a fully banked road's edges are raised and lowered."""
+        return self.bank * self.half_width
+
+    def height(self, d: Array, curvature: ArrayLike = 0.0) -> Array:
+        """Crown, bank, kerb and side (...) in metres, zero in the middle of the road.
+
+        curvature : (...) of the centre line, 1/m, left positive. With a share q = tanh(curvature /
+        BANK_CURVATURE), the road rises by q ``bank`` per metre outward in a bend, while 1 - q^2 of the
+        crown is left: fully banked it is a plane.
+        """
         offset = np.abs(d)
         road = np.minimum(offset, self.half_width)
-        crown = -CROWN_SLOPE * (np.hypot(road, 0.25) - 0.25)
+        q = np.tanh(np.asarray(curvature) / BANK_CURVATURE) if self.bank else np.zeros(())
+        crown = -CROWN_SLOPE * (np.hypot(road, 0.25) - 0.25) * (1 - q * q)
+        bank = q * self.bank * np.copysign(road, d)
+        if self.ruts:
+            for middle in (self.lane - _RUT_OFFSET_M, self.lane + _RUT_OFFSET_M):
+                crown = crown - self.ruts * np.exp(-0.5 * ((d - middle) / _RUT_WIDTH_M) ** 2)
         kerb = self.kerb * np.clip((offset - self.half_width) / KERB_RUN_M, 0.0, 1.0)
-        return crown + kerb + self.side_slope * np.maximum(offset - self.half_width, 0.0)
+        return crown + bank + kerb + self.side_slope * np.maximum(offset - self.half_width, 0.0)
 
 
 @dataclass(frozen=True)
@@ -82,10 +105,37 @@ class Road:
 
     def xyz(self, s: ArrayLike, d: ArrayLike) -> Array:
         """Surface points (..., 3) in world at road coordinates (...)."""
+        points = self.bare(s, d)
+        points[..., 2] += self.raised(s, d)
+        return points
+
+    def bare(self, s: ArrayLike, d: ArrayLike) -> Array:
+        """Surface points (..., 3) in world at road coordinates (...), without irregularities."""
         s, d = np.broadcast_arrays(np.asarray(s, dtype=np.float64), np.asarray(d, dtype=np.float64))
         xy = self.line.offset(s, d)
-        z = self.hills.height(xy) + self._height_over_hills(s, d)
+        on_road = np.clip((self.section.half_width + 0.5 - np.abs(d)) / 0.5, 0.15, 1.0)
+        z = self.hills.height(xy) + on_road * self.roughness.height(s, d)
+        z += self.section.height(d, self.line.curvature(s) if self.section.bank else 0.0)
         return _transform(self.world_from_map, np.concatenate([xy, z[..., None]], axis=-1))
+
+    def raised(self, s: ArrayLike, d: ArrayLike) -> Array:
+        """What irregularities add to the height (...) at road coordinates (...), m."""
+        s, d = np.broadcast_arrays(np.asarray(s, dtype=np.float64), np.asarray(d, dtype=np.float64))
+        z = np.zeros(s.shape)
+        for thing in self.irregularities:
+            s_min, s_max, d_min, d_max = thing.extent
+            local = self.near(s, thing)
+            within = (local > s_min) & (local < s_max) & (d > d_min) & (d < d_max)
+            if within.any():
+                z[within] += thing.height(local[within], d[within])
+        return z
+
+    def near(self, s: Array, thing: Irregularity) -> Array:
+        """Arc lengths (...) counted so that, on a closed road, they are nearest to ``thing``'s own."""
+        if not self.line.closed:
+            return s
+        half = self.line.length / 2
+        return thing.s + np.mod(s - thing.s + half, self.line.length) - half
 
     def height(self, xy: Array, guess: ArrayLike) -> Array:
         """World z (...) of the surface at world points xy (..., 2), near arc lengths ``guess``."""
@@ -114,20 +164,6 @@ class Road:
         half = np.broadcast_to(0.5 * yaw, position.shape[:-1])
         zero = np.zeros_like(half)
         return transform(position, np.stack([np.cos(half), zero, zero, np.sin(half)], axis=-1))
-
-    def _height_over_hills(self, s: Array, d: Array) -> Array:
-        on_road = np.clip((self.section.half_width + 0.5 - np.abs(d)) / 0.5, 0.15, 1.0)
-        z = self.section.height(d) + on_road * self.roughness.height(s, d)
-        for thing in self.irregularities:
-            s_min, s_max, d_min, d_max = thing.extent
-            local = s
-            if self.line.closed:
-                half = self.line.length / 2
-                local = thing.s + np.mod(s - thing.s + half, self.line.length) - half
-            near = (local > s_min) & (local < s_max) & (d > d_min) & (d < d_max)
-            if near.any():
-                z[near] += thing.height(local[near], d[near])
-        return z
 
 
 def hills(rng: np.random.Generator, swell: float = 0.25) -> Hills:

@@ -29,6 +29,8 @@ class Surface(IntEnum):
     FACE = 19
     BOARD = 20
     LAMP = 21
+    PATCH = 22
+    MANHOLE = 23
 
 
 @dataclass(frozen=True)
@@ -68,4 +70,6 @@ LOOKS = {
     Surface.FACE: Look((1.0, 1.0, 1.0), 0.0, 0.0, 0.45),
     Surface.BOARD: Look((1.0, 1.0, 1.0), 0.0, 0.0, 0.60),
     Surface.LAMP: Look((0.8, 0.8, 0.8), 0.0, 0.0, 0.60, emission=6.0),
+    Surface.PATCH: Look((0.075, 0.075, 0.08), 0.40, 0.15, 0.10),
+    Surface.MANHOLE: Look((0.16, 0.14, 0.125), 0.70, 0.20, 0.35),
 }

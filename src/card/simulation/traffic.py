@@ -28,7 +28,7 @@ _COLOURS = np.array(
 
 @dataclass(frozen=True)
 class Thing:
-    """What a label is drawn around: ``kind`` is bump, pothole, face or plate; the last two have a texture."""
+    """What can be told apart in an image, by ``kind``; faces and plates have a texture."""
 
     kind: str
     texture: NDArray[np.uint8] | None = None

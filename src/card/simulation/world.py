@@ -11,12 +11,12 @@ from card.simulation import scenery
 from card.simulation.calibrations import session_rig
 from card.simulation.centreline import CentreLine, circuit, winding
 from card.simulation.drives import Drive, drive_named
-from card.simulation.irregularities import Bump, Irregularity, Pothole, pothole
 from card.simulation.mesh import Mesh, join
 from card.simulation.raycast import Mover
 from card.simulation.rig import Rig
 from card.simulation.road import Road, hills
 from card.simulation.road_mesh import land_mesh, road_mesh
+from card.simulation.road_plan import plan
 from card.simulation.scales import Scale, scale_named
 from card.simulation.spectrum import roughness
 from card.simulation.traffic import Thing, Traffic
@@ -80,7 +80,7 @@ def world_of(name: str, drive: Drive, size: Scale, seed: int) -> World:
         drive.section,
         hills(rng),
         roughness(drive.road_class, rng, line.length if line.closed else None),
-        _irregularities(drive, line, where.at(begin), rng),
+        plan(drive, line, where.at(begin), rng),
         np.eye(4),
     )
     lane = Lane(drive.section.lane, 0.12, 65.0 if not line.closed else line.length / 3, rng.uniform(0, 6))
@@ -90,7 +90,7 @@ def world_of(name: str, drive: Drive, size: Scale, seed: int) -> World:
     path = Trajectory(path.t_ns, *_parts(world_from_map @ path.at(path.t_ns)))
 
     standing, lamps = _scenery(drive, road, _rng(seed, name, "scenery"))
-    things = [Thing("bump" if isinstance(t, Bump) else "pothole") for t in road.irregularities]
+    things = [Thing(thing.kind) for thing in road.irregularities]
     traffic = Traffic(drive, road, where, start_ns, _rng(seed, name, "traffic"), things)
     traffic.populate(begin, size.duration_s)
     static = join([*_ground(road, where), *standing, *traffic.parked])
@@ -123,50 +123,6 @@ def _line(drive: Drive, where: Course, rng: np.random.Generator) -> CentreLine:
     if drive.circuit is not None:
         return circuit(*drive.circuit)
     return winding(float(where.s[-1]) + _BEHIND_M + _AHEAD_M, -_BEHIND_M, drive.bend, rng)
-
-
-def _irregularities(
-    drive: Drive, line: CentreLine, camera_s: float, rng: np.random.Generator
-) -> tuple[Irregularity, ...]:
-    """Bumps and potholes all along; the cameras' excerpt always starts before one of each kind there is."""
-    edge = drive.section.half_width
-    first, last = line.start + 4, line.start + line.length - 4
-    found: list[Irregularity] = []
-    for s in _spots(camera_s + 8.0, drive.bump_spacing, line, first, last, rng):
-        if drive.section.paved and rng.random() < 0.5:
-            length, rise, profile = rng.uniform(3.6, 4.6), rng.uniform(0.07, 0.10), "flat"
-        else:
-            length, rise, profile = rng.uniform(1.0, 2.0), rng.uniform(0.04, 0.07), "round"
-        found.append(Bump(s, 0.15 - edge, edge - 0.15, length, rise, profile))
-    for s in _spots(camera_s + 12.5, drive.pothole_spacing, line, first, last, rng):
-        d = drive.section.lane + rng.choice([-0.84, 0.84]) + rng.uniform(-0.25, 0.25)
-        d = float(np.clip(d, 0.6 - edge, edge - 0.6))
-        if all(abs(s - other.s) > 3.5 for other in found if isinstance(other, Bump)):
-            found.append(pothole(s, d, rng))
-    return tuple(_apart(found))
-
-
-def _spots(
-    start: float, spacing: float, line: CentreLine, first: float, last: float, rng: np.random.Generator
-) -> list[float]:
-    if not spacing:
-        return []
-    steps = np.arange(np.ceil((first - start) / spacing), np.floor((last - start) / spacing) + 1)
-    jitter = np.where(steps == 0, 0.0, rng.uniform(-0.25, 0.25, len(steps)))
-    spots = start + (steps + jitter) * spacing
-    return [float(s) for s in spots if first < s < last]
-
-
-def _apart(things: list[Irregularity]) -> list[Irregularity]:
-    """Without potholes whose meshes would overlap."""
-    kept: list[Irregularity] = []
-    for thing in things:
-        if isinstance(thing, Pothole) and any(
-            abs(thing.s - k.s) < 1.8 for k in kept if isinstance(k, Pothole)
-        ):
-            continue
-        kept.append(thing)
-    return kept
 
 
 def _ground(road: Road, where: Course) -> list[Mesh]:
