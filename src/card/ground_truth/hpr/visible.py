@@ -1,0 +1,92 @@
+"""The points that a viewer at the origin sees, exactly and fast."""
+
+from __future__ import annotations
+
+from typing import NoReturn
+
+import numpy as np
+import numpy.typing as npt
+
+from card.errors import CardError
+from card.ground_truth.hpr.candidates import farthest, low_enough, near_enough
+from card.ground_truth.hpr.cells import EMPTY, Cells, assign, indices, lay_out, survey
+from card.ground_truth.hpr.insertion_order import by_rounds, morton_order
+from card.ground_truth.hpr.lift import COLUMNS, lift
+from card.ground_truth.hpr.reference import spans_space, visible_by_hull
+from card.ground_truth.hpr.triangulation import CORNERS, MAX_STEPS, Mesh, add_corners, lower_hull
+from card.ground_truth.hpr.upper_bound import upper_bound
+from card.ground_truth.hpr.workspace import Workspace
+
+Points = npt.NDArray[np.float64]
+
+
+def visible_points(
+    points: npt.NDArray[np.float64], radius: float, workspace: Workspace | None = None
+) -> npt.NDArray[np.int64]:
+    """Increasing indices of the points (N, 3), metres, that a viewer at the origin sees, looking along +z.
+
+    The same set as `visible_by_hull` gives, once points closer together than 1e-8 m are merged: of those one
+    is returned. `radius` is that of the sphere of the flip, metres.
+
+    Raises
+    ------
+    CardError
+        If a point is not in front of the viewer (z > 0), or as far as the radius: the flip of a point beyond
+        the sphere says nothing.
+    """
+    u_low, u_high, v_low, v_high, bad = survey(points, radius)
+    if bad >= 0:
+        _refuse(points[bad], radius)
+    if not spans_space(points):
+        return np.arange(len(points))
+    memory = workspace or Workspace()
+    cells = lay_out(u_low, u_high, v_low, v_high, len(points))
+    lifted, index, place = _candidates(points, 2 * radius, cells, memory)
+    morton, order, spare, sequence = memory.take("order", (4, len(index)), np.uint32)
+    morton_order(place, morton, order, spare)
+    ordered = memory.take("ordered", (len(index) + CORNERS, COLUMNS), np.float64)
+    np.take(lifted, order, axis=0, out=ordered[:-CORNERS])
+    add_corners(ordered)
+    by_rounds(ordered, morton, order, sequence, memory.take("used", len(index), np.bool_))
+    vertex = np.zeros(len(ordered), np.bool_)
+    if not lower_hull(ordered, sequence, Mesh.of(len(index), memory), vertex, MAX_STEPS):
+        return visible_by_hull(points, radius)
+    return np.sort(index[order[vertex[:-CORNERS]]]).astype(np.int64)
+
+
+def _candidates(
+    points: Points, diameter: float, cells: Cells, memory: Workspace
+) -> tuple[Points, npt.NDArray[np.uint32], npt.NDArray[np.uint16]]:
+    """What may be visible: lifted (M, 4), indices (M,), and column and row of their cells (M, 2)."""
+    nearest = memory.take("nearest", cells.rows * cells.columns, np.uint64)
+    nearest[:] = EMPTY
+    cell = memory.take("cell", len(points), np.uint32)
+    range2 = memory.take("range2", len(points), np.float32)
+    assign(points, cells, cell, range2, nearest)
+    occupied, first = indices(nearest)
+    lifted = memory.take("lifted", (len(first), COLUMNS), np.float64)
+    lift(points, first, diameter, lifted)
+    bound = upper_bound(cells, occupied, lifted, memory)
+    limit = memory.take("limit", len(nearest), np.float32)
+    farthest(bound, cells, diameter, limit)
+    index = memory.take("near enough", len(points) + 1, np.uint32)
+    index = index[: near_enough(cell, range2, limit, index)]
+    lifted = memory.take("lifted", (len(index), COLUMNS), np.float64)
+    lift(points, index, diameter, lifted)
+    kept = memory.take("kept", (len(index), COLUMNS), np.float64)
+    kept_index = memory.take("kept index", len(index), np.uint32)
+    place = memory.take("place", (len(index), 2), np.uint16)
+    count = low_enough(lifted, index, bound, cells, kept, kept_index, place)
+    return kept[:count], kept_index[:count], place[:count]
+
+
+def _refuse(point: Points, radius: float) -> NoReturn:
+    if not point[2] > 0:
+        raise CardError(
+            "hidden-point removal looks along +z only", found=f"a point at z = {point[2]:g} m", wanted="z > 0"
+        )
+    raise CardError(
+        "cloud is too far away for hidden-point removal",
+        found=f"a point at {np.linalg.norm(point):.1f} m",
+        wanted=f"less than the radius of {radius:.1f} m",
+    )
