@@ -23,6 +23,7 @@ FLOORS: dict[str, set[str]] = {
             "wheels",
             "privacy",
             "annotations",
+            "irregularities",
             "splits",
             "packaging",
         )

@@ -138,6 +138,7 @@ def stages_of(sequence):
         "wheels": has_map(sequence),
         "privacy": has_camera(sequence),
         "annotations": has(sequence, "camera_left"),
+        "irregularities": has_map(sequence),
         "splits": has(sequence, "camera_left"),
     }
     return ["ingest", *(stage for stage, wanted in planned.items() if wanted)]
@@ -146,7 +147,9 @@ def stages_of(sequence):
 def package_inputs(wildcards):
     """Artifacts by the names that packaging gives them, and the report of every stage, as far as planned."""
     stages = [
-        stage for stage in stages_of(SEQUENCES[wildcards.id]) if stage != "splits"
+        stage
+        for stage in stages_of(SEQUENCES[wildcards.id])
+        if stage not in ("splits", "irregularities")
     ]
     found = {f"{stage}_report": getattr(rules, stage).output.report for stage in stages}
     for name, (stage, output) in PACKED.items():
