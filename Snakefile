@@ -34,6 +34,7 @@ rule release:
     default_target: True
     input:
         validations(),
+        rules.split_lists.output,
         simulated_days(),
 
 

@@ -1,4 +1,4 @@
-"""Command line: `card validate TREE`, `card splits extend`, `card summary`, and those of COMMANDS."""
+"""Command line: `card validate TREE`, `card summary`, and those of COMMANDS."""
 
 import argparse
 import logging
@@ -9,7 +9,11 @@ from pathlib import Path
 
 from card.errors import CardError
 
-COMMANDS = ("card.packaging.commands.verify", "card.packaging.commands.extract")
+COMMANDS = (
+    "card.packaging.commands.verify",
+    "card.packaging.commands.extract",
+    "card.splits.command",
+)
 """Modules of one command each, with `add`, which adds it to the parser."""
 
 
@@ -23,14 +27,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     validate.add_argument("--ledger", type=Path, help="split ledger that the splits must equal")
     validate.add_argument("--load", action="store_true", help="also load every config with `datasets`")
     validate.set_defaults(run=_validate)
-
-    splits = commands.add_parser("splits", help="the split ledger").add_subparsers(
-        required=True, metavar="ACTION"
-    )
-    extend = splits.add_parser("extend", help="append rows for new sequences")
-    extend.add_argument("--config", type=Path, default=Path("config/config.yaml"))
-    extend.add_argument("--results", type=Path, default=Path("results"))
-    extend.set_defaults(run=_extend)
 
     summary = commands.add_parser("summary", help="what was released")
     summary.add_argument("release", type=Path, nargs="?", default=Path("results/release"))
@@ -57,26 +53,6 @@ def _validate(options: argparse.Namespace) -> None:
     ledger = read_sheet(options.ledger, "splits_ledger") if options.ledger else None
     validate(options.tree, report=None, settings=settings, ledger=ledger)
     print(f"{options.tree} is valid")
-
-
-def _extend(options: argparse.Namespace) -> None:
-    from card.artifacts import load_schema, read_yaml
-    from card.artifacts.schemas import with_defaults
-    from card.packaging.licenses import read_licenses
-    from card.recording.sheet import read_sequences
-    from card.splits.extend import extend_ledger
-
-    settings = with_defaults(read_yaml(options.config, "config"), load_schema("config"))
-    countries = read_licenses(Path(settings["licenses"]))["countries"]
-    rows = extend_ledger(
-        sequences=[sequence.as_dict() for sequence in read_sequences(Path(settings["sheet"]), countries)],
-        results=options.results,
-        ledger=Path(settings["splits_ledger"]),
-        settings=settings["splits"],
-    )
-    for row in rows:
-        print("\t".join(row.cells()))
-    print(f"{len(rows)} rows appended to {settings['splits_ledger']}")
 
 
 def _summary(options: argparse.Namespace) -> None:

@@ -154,6 +154,7 @@ def assemble_tree(
         sequences=sequences,
         release_folder=ROOT / "release",
         schemas=schema_folder(),
+        split_report=None,
         out=out,
         report=out.with_name(f"{out.name}.report.json"),
         settings=SETTINGS,

@@ -10,7 +10,6 @@ from card.artifacts import default_settings, load_schema, read_table, write_tabl
 from card.cli import main
 from card.errors import CardError
 from card.splits import assign, extend_ledger
-from card.splits.extend import Drive, choose
 from card.splits.ledger import COLUMNS, Row
 from card.splits.strata import sequence_topography, topography
 
@@ -87,6 +86,9 @@ def test_frames_without_a_row_are_unassigned_and_reported(tmp_path: Path) -> Non
     assert table["group"][0] is None
     report = json.loads((tmp_path / "splits.report.json").read_text())
     assert report["figures"][0]["value"] == 6
+    assert report["notes"] == []  # a gap between two blocks
+    run(tmp_path, [])
+    report = json.loads((tmp_path / "splits.report.json").read_text())
     assert "assign_splits" in report["notes"][0]
 
 
@@ -126,38 +128,12 @@ def test_topography_of_a_sequence_is_its_rarest() -> None:
     assert sequence_topography([]) == "unknown"
 
 
-def drives(count: int, stratum: str = "none/town", frames: int = 100) -> list[Drive]:
-    return [Drive(f"{stratum[:3]}{n:03d}", "split", tuple(range(frames)), stratum) for n in range(count)]
-
-
-def share(rows: list[Row], split: str) -> float:
-    return sum(row.split == split for row in rows) / len(rows)
-
-
-def test_shares_reach_their_targets_overall_and_in_each_stratum() -> None:
-    new = drives(50) + drives(50, "positive/town") + drives(20, "negative/town")
-    rows = choose([], new, SETTINGS)
-    for stratum in ("none/town", "positive/town", "negative/town"):
-        inside = [row for row in rows if row.stratum == stratum]
-        for split, target in (("train", 0.6), ("validation", 0.2), ("test", 0.2)):
-            assert abs(share(inside, split) - target) <= 1.5 / len(inside)
-
-
-def test_four_drives_of_four_strata_fill_all_splits() -> None:
-    rows = choose([], [drives(1, name)[0] for name in ("aaa/x", "bbb/x", "ccc/x", "ddd/x")], SETTINGS)
-    assert sorted(row.split for row in rows) == ["test", "train", "train", "validation"]
-
-
-def test_new_drives_make_up_for_what_old_rows_left() -> None:
-    old = [Row(drive.id, 0, None, "train", drive.stratum, drive.id) for drive in drives(6)]
-    rows = choose(old, drives(10), SETTINGS)
-    assert {row.sequence for row in rows} == {f"non{n:03d}" for n in range(6, 10)}
-    assert sorted(row.split for row in rows) == ["test", "test", "validation", "validation"]
-
-
-def test_the_order_of_the_sheet_does_not_matter() -> None:
-    new = drives(20) + drives(7, "positive/town", frames=50)
-    assert choose([], new, SETTINGS) == choose([], new[::-1], SETTINGS)
+def extend(tmp_path: Path, sheet: list[dict[str, Any]], ledger: Path) -> list[Row]:
+    anchors = tmp_path / "anchors.tsv"
+    anchors.write_text("\t".join(load_schema("anchors")["properties"]) + "\n")
+    return extend_ledger(
+        sequences=sheet, results=tmp_path / "results", ledger=ledger, anchors=anchors, settings=SETTINGS
+    )
 
 
 def test_extending_appends_new_sequences_only(tmp_path: Path) -> None:
@@ -172,16 +148,14 @@ def test_extending_appends_new_sequences_only(tmp_path: Path) -> None:
         sheet_row("z", role="zero_shot"),
         sheet_row("q") | {"quarantine": "bad"},
     ]
-    rows = extend_ledger(sequences=sheet, results=tmp_path / "results", ledger=ledger, settings=SETTINGS)
+    rows = extend(tmp_path, sheet, ledger)
     assert [(row.sequence, row.split, row.stratum) for row in rows] == [
         ("b", "train", "negative/town"),
         ("z", "zero_shot", "negative/town"),
     ]
     assert ledger.read_text().startswith(old)
     after = ledger.read_bytes()
-    assert (
-        extend_ledger(sequences=sheet, results=tmp_path / "results", ledger=ledger, settings=SETTINGS) == []
-    )
+    assert extend(tmp_path, sheet, ledger) == []
     assert ledger.read_bytes() == after
 
 
@@ -189,14 +163,14 @@ def test_a_sequence_without_results_cannot_be_assigned(tmp_path: Path) -> None:
     ledger = tmp_path / "splits.tsv"
     ledger.write_text("\t".join(COLUMNS) + "\n")
     with pytest.raises(CardError, match=r"sequence a: the sequence is not processed yet"):
-        extend_ledger(sequences=[sheet_row()], results=tmp_path / "results", ledger=ledger, settings=SETTINGS)
+        extend(tmp_path, [sheet_row()], ledger)
 
 
 def test_the_command_line_extends_the_ledger_of_the_config(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     licenses = Path(__file__).resolve().parents[2] / "config" / "licenses.yaml"
-    cells = "de_new\trecordings/de_new\tnative\tDE\ttown\t-\ttown\tsplit\tfalse\tall\t-"
+    cells = "de_new\trecordings/de_new\tnative\tDE\ttown\t-\ttown\tday\tsplit\tfalse\tall\t-"
     header = "\t".join(load_schema("sequences")["properties"])
     (tmp_path / "sheet.tsv").write_text(f"{header}\n{cells}\n")
     (tmp_path / "splits.tsv").write_text("\t".join(COLUMNS) + "\n")
@@ -204,6 +178,8 @@ def test_the_command_line_extends_the_ledger_of_the_config(
         f"sheet: sheet.tsv\nlicenses: {licenses}\nsplits_ledger: splits.tsv\n"
         "splits: {train_share: 0, test_share: 1}\n"
     )
+    (tmp_path / "config").mkdir()
+    (tmp_path / "config" / "anchors.tsv").write_text("\t".join(load_schema("anchors")["properties"]) + "\n")
     write_inputs(tmp_path / "results" / "de_new")
     monkeypatch.chdir(tmp_path)
     assert main(["splits", "extend", "--config", "config.yaml"]) == 0

@@ -1,10 +1,13 @@
 """The split ledger: rows, ranges, and that it only grows."""
 
+import subprocess
 from pathlib import Path
 
 import pytest
 
+from card.cli import main
 from card.errors import CardError
+from card.splits.history import check_kept
 from card.splits.ledger import COLUMNS, Row, append_rows, check_append_only, parse, read_ledger
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -69,3 +72,53 @@ def test_a_changed_moved_or_dropped_row_is_an_error(new: str, line: str) -> None
 def test_the_committed_ledger_is_valid() -> None:
     rows = read_ledger(ROOT / "config" / "ledger" / "splits.tsv")
     assert {row.split for row in rows} == {"train", "validation", "test", "zero_shot"}
+
+
+def git(folder: Path, *arguments: str) -> None:
+    identity = ["-c", "user.name=A", "-c", "user.email=a@example.org"]
+    subprocess.run(["git", "-C", folder, *identity, *arguments], check=True, capture_output=True)
+
+
+@pytest.fixture
+def committed(tmp_path: Path) -> Path:
+    """A configuration in git, its ledger with one row, which a tag names as the last release."""
+    ledger = tmp_path / "splits.tsv"
+    ledger.write_text("\t".join(COLUMNS) + "\nz\t0\t-\ttrain\tnone/town\tz\n")
+    (tmp_path / "config.yaml").write_text("splits_ledger: splits.tsv\n")
+    git(tmp_path, "init", "--quiet")
+    git(tmp_path, "add", ".")
+    git(tmp_path, "commit", "--quiet", "-m", "x")
+    git(tmp_path, "tag", "v1.0.0")
+    return ledger
+
+
+def test_a_row_that_moved_since_the_last_release_is_an_error(
+    committed: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(committed.parent)
+    check = ["splits", "check", "--config", "config.yaml", "--against", "v1.0.0"]
+    append_rows(committed, [Row("a", 0, 9, "test", "none/town", "a")])
+    assert main(check) == 0
+    assert "2 rows, none moved since v1.0.0" in capsys.readouterr().out
+    committed.write_text(committed.read_text().replace("train", "test"))
+    git(committed.parent, "commit", "--quiet", "-a", "-m", "moved")
+    assert check_kept(committed)  # nothing moved since the last commit
+    assert main(check) == 1
+    error = capsys.readouterr().err
+    assert "append-only; a row was changed since v1.0.0" in error
+    assert "line 2" in error
+    assert "wanted z 0 - train" in error
+
+
+def test_outside_git_there_is_nothing_to_compare(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    ledger = tmp_path / "splits.tsv"
+    ledger.write_text("\t".join(COLUMNS) + "\n")
+    assert not check_kept(ledger)
+    config = tmp_path / "config.yaml"
+    config.write_text(f"splits_ledger: {ledger}\n")
+    assert main(["splits", "check", "--config", str(config)]) == 1
+    assert "nothing to compare with" in capsys.readouterr().err
+
+
+def test_the_committed_ledger_only_grew_since_the_last_commit() -> None:
+    check_kept(ROOT / "config" / "ledger" / "splits.tsv")

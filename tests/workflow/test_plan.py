@@ -22,6 +22,11 @@ def tree(*repositories: str) -> set[tuple[str, str]]:
     return {(rule, name) for name in repositories for rule in ("assemble", "validate_tree")}
 
 
+def split_tree(*repositories: str) -> set[tuple[str, str]]:
+    """A tree, and what is said about the splits of its sequences; Germany's may be used commercially."""
+    return tree(*repositories) | {("split_report", name) for name in repositories} | {("split_lists", "")}
+
+
 @contextmanager
 def without(path: Path, aside: Path) -> Iterator[None]:
     """Take a file or folder away for the time of the block, keeping its times."""
@@ -51,7 +56,7 @@ def test_one_raw_sweep_reruns_its_own_sequence_and_tree(built: Project) -> None:
     content = sweep.read_bytes()
     sweep.write_bytes(content + b"\0")
     try:
-        assert built.plan() == chain(TOWN, *STAGES) | tree(GERMANY)
+        assert built.plan() == chain(TOWN, *STAGES) | split_tree(GERMANY)
     finally:
         sweep.write_bytes(content)
 
@@ -59,7 +64,7 @@ def test_one_raw_sweep_reruns_its_own_sequence_and_tree(built: Project) -> None:
 def test_a_removed_raw_image_reruns_its_own_sequence_and_tree(built: Project, tmp_path: Path) -> None:
     image = sorted((built.root / "recordings" / TOWN / "camera_right").iterdir())[0]
     with without(image, tmp_path / image.name):
-        assert built.plan() == chain(TOWN, *STAGES) | tree(GERMANY)
+        assert built.plan() == chain(TOWN, *STAGES) | split_tree(GERMANY)
 
 
 def test_one_label_file_reruns_annotations_and_what_packs_them(built: Project) -> None:
@@ -68,7 +73,7 @@ def test_one_label_file_reruns_annotations_and_what_packs_them(built: Project) -
     text = label.read_text()
     label.write_text(text + "1 0.5 0.5 0.1 0.1\n")
     try:
-        assert built.plan() == chain(TOWN, "annotations", "splits", "package") | tree(GERMANY), name
+        assert built.plan() == chain(TOWN, "annotations", "splits", "package") | split_tree(GERMANY), name
     finally:
         label.write_text(text)
 
@@ -99,10 +104,10 @@ def test_an_edited_comment_reruns_nothing(built: Project) -> None:
 
 
 def test_a_subset_plans_only_its_sequences_and_leaves_the_release_alone(built: Project) -> None:
-    assert built.plan("--config", f"sequences={TOWN}") == tree(GERMANY)
+    assert built.plan("--config", f"sequences={TOWN}") == split_tree(GERMANY)
     assert built.plan("--forceall", "--config", f"sequences={TOWN}") == (
         chain(TOWN, "calibration", *STAGES, "simulate_drive")
-        | tree(GERMANY)
+        | split_tree(GERMANY)
         | {("simulate_session", f"2026-04-14-{part}") for part in ("start", "mid", "end")}
         | {("simulate_survey", "2026-04-14")}
     )
@@ -115,13 +120,13 @@ def sheet_line(built: Project, id: str) -> str:
 
 def test_a_removed_sequence_reassembles_its_tree_only(built: Project) -> None:
     with built.changed("config/sequences.tsv", sheet_line(built, TOWN), ""):
-        assert built.plan() == tree(GERMANY)
+        assert built.plan() == split_tree(GERMANY)
 
 
 def test_a_quarantined_sequence_reassembles_its_tree_only(built: Project) -> None:
     line = sheet_line(built, TOWN)
     with built.changed("config/sequences.tsv", line, line.replace("\t-\n", "\tblurred by rain\n")):
-        assert built.plan() == tree(GERMANY)
+        assert built.plan() == split_tree(GERMANY)
 
 
 def test_an_added_sequence_runs_its_own_chain(built: Project) -> None:
@@ -133,7 +138,7 @@ def test_an_added_sequence_runs_its_own_chain(built: Project) -> None:
     description.write_text(description.read_text().replace(f"id: {TOWN}", f"id: {added}"))
     try:
         with built.changed("config/sequences.tsv", line, line + line.replace(TOWN, added)):
-            assert built.plan() == chain(added, "calibration", *STAGES) | tree(GERMANY)
+            assert built.plan() == chain(added, "calibration", *STAGES) | split_tree(GERMANY)
     finally:
         shutil.rmtree(folder)
 
@@ -152,7 +157,7 @@ def test_another_country_moves_the_sequence(built: Project) -> None:
         built.changed("config/sequences.tsv", line, line.replace("\tDE\t", "\tIT\t")),
         built.changed(f"recordings/{TOWN}/recording.yaml", "country: DE", "country: IT"),
     ):
-        assert built.plan() == chain(TOWN, *STAGES) | tree(GERMANY, ITALY)
+        assert built.plan() == chain(TOWN, *STAGES) | split_tree(GERMANY, ITALY)
 
 
 def test_another_licence_of_a_country_repacks_its_sequences(built: Project) -> None:
@@ -160,7 +165,7 @@ def test_another_licence_of_a_country_repacks_its_sequences(built: Project) -> N
     with built.changed("config/licenses.yaml", "DE: CC-BY-4.0", "DE: CC-BY-NC-4.0"):
         plan = built.plan()
     # The emptied tree is assembled too: nothing of the old licence may stay in it.
-    assert plan == {("package", id) for id in german} | tree(GERMANY, ITALY)
+    assert plan == {("package", id) for id in german} | split_tree(GERMANY, ITALY)
 
 
 def test_a_ledger_row_moves_only_its_sequence(built: Project) -> None:
@@ -169,7 +174,7 @@ def test_a_ledger_row_moves_only_its_sequence(built: Project) -> None:
     with built.changed(
         ledger, line, line.replace(line.split("\t")[3], "test" if "train" in line else "train", 1)
     ):
-        assert built.plan() == chain(TOWN, "splits") | tree(GERMANY)
+        assert built.plan() == chain(TOWN, "splits") | split_tree(GERMANY)
 
 
 def test_lost_records_are_refused(built: Project, tmp_path: Path) -> None:

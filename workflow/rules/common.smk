@@ -13,6 +13,7 @@ from card.recording.description import check_identity
 from card.recording.fingerprint import fingerprint
 from card.recording.sheet import read_sequences
 from card.recording.space import require_space
+from card.splits.history import check_kept
 from card.splits.ledger import COLUMNS, read_ledger
 
 BASE = Path(workflow.basedir)
@@ -43,6 +44,7 @@ def load_plan():
     }
     for row in chosen.values():
         check_raw_input(row)
+    check_kept(Path(SETTINGS["splits_ledger"]))
     ledger = [
         dict(zip(COLUMNS, line.cells()))
         for line in read_ledger(Path(SETTINGS["splits_ledger"]))

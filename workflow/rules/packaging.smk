@@ -53,6 +53,7 @@ rule assemble:
     input:
         packages=tree_packages,
         splits=tree_splits,
+        split_report=rules.split_report.output.report,
         schemas=sorted(os.path.relpath(path) for path in schema_folder().glob("*.json")),
         changelog=str(TEMPLATES / "CHANGELOG.md"),
         templates=sorted(str(path) for path in TEMPLATES.rglob("*") if path.is_file()),

@@ -199,6 +199,33 @@ def tree_splits(wildcards):
     return expand(rules.splits.output.splits, id=chosen)
 
 
+def tree_poses(wildcards):
+    chosen = [
+        sequence.id
+        for sequence in in_tree(wildcards.repository)
+        if has(sequence, "camera_left") and has_poses(sequence)
+    ]
+    return expand(rules.poses.output.poses, id=chosen)
+
+
+def commercial_sequences(wildcards):
+    """Sequences with frames by repository, of the repositories whose licence permits commercial use."""
+    return {
+        repository: [
+            sequence.id
+            for sequence in in_tree(repository)
+            if has(sequence, "camera_left")
+        ]
+        for repository, spdx in REPOSITORIES.items()
+        if LICENSES["licenses"][spdx]["commercial"]
+    }
+
+
+def commercial_splits(wildcards):
+    names = sum(commercial_sequences(wildcards).values(), [])
+    return expand(rules.splits.output.splits, id=names)
+
+
 def validations():
     """All trees, an emptied one too; of a subset just those that it has sequences for."""
     repositories = [name for name in REPOSITORIES if in_tree(name) or not SUBSET]

@@ -19,6 +19,7 @@ with logged(Path(snakemake.log[0])):
         ],
         release_folder=Path(snakemake.input.changelog).parent,
         schemas=schema_folder(),
+        split_report=Path(snakemake.input.split_report),
         out=Path(snakemake.params.out),
         report=Path(snakemake.output.report),
         settings=snakemake.params.cfg["settings"],

@@ -10,5 +10,6 @@ with logged(Path(snakemake.log[0])):
         sequences=snakemake.params.sequences,
         results=Path("results"),
         ledger=Path(snakemake.params.ledger),
+        anchors=Path(snakemake.input.anchors),
         settings=snakemake.params.cfg["settings"],
     )

@@ -49,6 +49,7 @@ def assemble(
     sequences: Sequence[Mapping[str, Any]],
     release_folder: Path,
     schemas: Path,
+    split_report: Path | None,
     out: Path,
     report: Path,
     settings: Mapping[str, Any],
@@ -61,6 +62,7 @@ def assemble(
     spdx, terms : the tree's licence and its entry of `config/licenses.yaml`.
     sequences : {id, package, splits} each: a package folder and the table of splits, None without frames.
     release_folder : templates and licence texts; schemas : folder of the schemas that ship with the tree.
+    split_report : report of the splits' leakage and balance, None without.
 
     CardError when anything in a package is under another licence than the tree.
     """
@@ -99,6 +101,7 @@ def assemble(
             sequences=rows,
             terms=terms,
             about=settings["release"],
+            splits=read_json(split_report, "report") if split_report else None,
             has_mini=bool(mini["frame"]),
         )
         hashes |= _hash_rest(tree, hashes)
@@ -114,6 +117,7 @@ def assemble(
         stage="release",
         settings=settings,
         inputs={"checksums": out / "SHA256SUMS"}
+        | ({"split_report": split_report} if split_report else {})
         | {f"package_{item['id']}": Path(item["package"]) / "inventory.parquet" for item in ordered},
         counts={
             "sequences": len(rows),
@@ -193,7 +197,6 @@ def _hash_rest(tree: Path, known: Mapping[str, str]) -> dict[str, str]:
 
 
 def _outside_ledger(frames: Sequence[Mapping[str, Any]], sequence: str) -> bool:
-    return any(
-        row["sequence"] == sequence and row["split"] == "unassigned" and row["group"] is None
-        for row in frames
-    )
+    # A gap between two blocks has no group either.
+    groups = [row["group"] for row in frames if row["sequence"] == sequence and row["split"] != "zero_shot"]
+    return bool(groups) and not any(groups)

@@ -24,6 +24,7 @@ def write_pages(
     sequences: Sequence[Mapping[str, Any]],
     terms: Mapping[str, Any],
     about: Mapping[str, str],
+    splits: Mapping[str, Any] | None,
     has_mini: bool,
 ) -> None:
     """Write all pages into `tree`.
@@ -34,6 +35,7 @@ def write_pages(
     release : document `release`; sequences : rows of the sequence table.
     terms : the licence's entry of `config/licenses.yaml`.
     about : title, creator, contact and url from the settings.
+    splits : report of the stage `split_report`, None without frames.
     has_mini : whether `mini.parquet` has rows.
     """
     values = {
@@ -53,6 +55,7 @@ def write_pages(
         "example_split": next((split for split in SPLITS if release["frames"][split]), SPLITS[0]),
         "counts": _counts(release, sequences),
         "split_table": _table(("split", "frames"), [(split, release["frames"][split]) for split in SPLITS]),
+        "split_figures": _split_figures(splits),
         "sequence_table": _table(
             (
                 "sequence",
@@ -129,6 +132,28 @@ def _counts(release: Mapping[str, Any], sequences: Sequence[Mapping[str, Any]]) 
         f"{len(sequences)} sequences from {places} places, {seconds / 3600:.3g} h, {metres / 1000:.3g} km, "
         f"{frames} frames, {release['files']} files, {release['bytes'] / 1e9:.3g} GB."
     )
+
+
+def _split_figures(report: Mapping[str, Any] | None) -> str:
+    """What the splits are worth, as far as it is known."""
+    if report is None:
+        return "There are no frames to split."
+    value = {figure["name"]: figure["value"] for figure in report["figures"]}
+    counts = report["counts"]
+    unknown = (
+        f" {counts['test_unknown']} test frames have training frames of their place without a common map."
+    )
+    near = (
+        f"95 % of the test frames lie {value['leak_m_p5']:.0f} m or more from the nearest training frame."
+        if value["leak_m_p5"] is not None
+        else "No training frame is known to be near a test frame."
+    )
+    balance = (
+        f" Shares of the strata are off their targets by {value['stratum_deviation']:.3f} on average."
+        if value["stratum_deviation"] is not None
+        else ""
+    )
+    return near + (unknown if counts["test_unknown"] else "") + balance
 
 
 def _sequence_cells(row: Mapping[str, Any]) -> tuple[Any, ...]:

@@ -67,12 +67,14 @@ def _gates(tree: Path) -> list[Any]:
 
 
 def _without_split(trees: Sequence[Path]) -> list[str]:
-    rows = (
-        row
-        for tree in trees
-        for row in read_table(tree / "metadata" / "frames-unassigned.parquet", "release_frames").to_pylist()
-    )
-    return sorted({row["sequence"] for row in rows if row["group"] is None})
+    """Sequences without a frame in any group; a gap between two blocks of a sequence has none either."""
+    grouped: dict[str, bool] = {}
+    for tree in trees:
+        for path in sorted((tree / "metadata").glob("frames-*.parquet")):
+            for row in read_table(path, "release_frames").to_pylist():
+                known = row["group"] is not None or row["split"] == "zero_shot"
+                grouped[row["sequence"]] = grouped.get(row["sequence"], False) or known
+    return sorted(sequence for sequence, known in grouped.items() if not known)
 
 
 def _bytes(count: int) -> str:

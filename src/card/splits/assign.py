@@ -74,7 +74,9 @@ def assign(
             )
         ],
         gates=gates,
-        notes=["run `snakemake assign_splits` to give this sequence its split"] if outside else [],
+        notes=["run `snakemake assign_splits` to give this sequence its split"]
+        if outside and not ledger
+        else [],
     )
 
 
