@@ -1,0 +1,1 @@
+"""How well a detector repeats the labels: the measure of how consistently they were drawn."""
