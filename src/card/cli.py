@@ -13,6 +13,7 @@ COMMANDS = (
     "card.packaging.commands.verify",
     "card.packaging.commands.extract",
     "card.splits.command",
+    "card.benchmark.command",
 )
 """Modules of one command each, with `add`, which adds it to the parser."""
 

@@ -1,5 +1,5 @@
-# Needs: validated trees; for each method a folder <repository>/<sequence>/<frame:06d>.npy of depth maps in metres.
-# Makes: results/benchmark/{method}/{repository}.json and .md.
+# Needs: validated trees; for each method a folder <repository>/<sequence>/<frame:06d>.{npz,npy,png,exr} of depth maps.
+# Makes: results/benchmark/{method}/{repository}/: evaluation, tables as Markdown and Parquet.
 
 
 rule evaluate:
@@ -7,28 +7,22 @@ rule evaluate:
         sums=rules.assemble.output.sums,
         validation=rules.validate_tree.output.validation,
     output:
-        scores="results/benchmark/{method}/{repository}.json",
-        table="results/benchmark/{method}/{repository}.md",
+        evaluation="results/benchmark/{method}/{repository}/evaluation.json",
+        table="results/benchmark/{method}/{repository}/table.md",
+        parquet=[
+            f"results/benchmark/{{method}}/{{repository}}/{name}.parquet"
+            for name in ("frames", "boxes", "distances")
+        ],
         report="results/benchmark/{method}/{repository}.report.json",
     log:
         "logs/benchmark/{method}/{repository}.log",
     params:
-        cfg=cfg(
-            "benchmark", "profile", "min_depth_m", "max_depth_m", "height_thresholds_m"
-        ),
+        cfg=cfg("benchmark", *PROTOCOL),
         code=code("evaluate"),
-        raw=lambda wildcards: fingerprint(
-            predictions(wildcards),
-            Path(
-                "results",
-                "benchmark",
-                wildcards.method,
-                f"{wildcards.repository}.fingerprint.json",
-            ),
-        ),
+        method=method_of,
+        raw=predictions_fingerprint,
         tree=subpath(input.sums, parent=True),
-        split=SETTINGS["benchmark"]["split"],
-        predictions=lambda wildcards: str(predictions(wildcards)),
+        out=subpath(output.evaluation, parent=True),
     script:
         "../scripts/evaluate.py"
 

@@ -24,6 +24,8 @@ SUBSET = [name for name in str(SETTINGS["sequences"]).split(",") if name]
 RELEASE = "results/release-subset" if SUBSET else "results/release"
 CAMERAS = ("camera_left", "camera_right")
 LIDARS = ("lidar_front", "lidar_rear")
+# What an evaluation depends on; not on which methods there are.
+PROTOCOL = [name for name in SETTINGS["benchmark"] if name not in ("methods", "split")]
 
 
 def load_plan():

@@ -241,20 +241,48 @@ def report_inputs(wildcards):
     ]
 
 
-def predictions(wildcards):
-    return Path(
-        SETTINGS["benchmark"]["methods"][wildcards.method], wildcards.repository
+def method_of(wildcards):
+    """A param function: what the configuration says of a method, for one tree, as a dict of builtins."""
+    method = SETTINGS["benchmark"]["methods"][wildcards.method]
+    task = method.get("task", "depth")
+    split = "zero_shot" if task == "odometry" else SETTINGS["benchmark"]["split"]
+    return {
+        "predictions": str(Path(method["predictions"], wildcards.repository)),
+        "task": task,
+        "split": method.get("split", split),
+        "space": method.get("space", "original"),
+        "unit_m": method.get("unit_m"),
+    }
+
+
+def predictions_fingerprint(wildcards):
+    return fingerprint(
+        Path(method_of(wildcards)["predictions"]),
+        Path(
+            "results/benchmark",
+            wildcards.method,
+            f"{wildcards.repository}.fingerprint.json",
+        ),
     )
+
+
+def methods_for(repository, odometry=False):
+    """The methods that have predictions for a tree: of depth maps, or of trajectories."""
+    return [
+        name
+        for name, method in SETTINGS["benchmark"]["methods"].items()
+        if in_tree(repository)
+        and (method.get("task") == "odometry") == odometry
+        and Path(method["predictions"], repository).is_dir()
+    ]
 
 
 def evaluations(wildcards):
     """One table a method and tree that the method has predictions for."""
-    methods = SETTINGS["benchmark"]["methods"]
     tables = [
-        f"results/benchmark/{method}/{repository}.md"
-        for method, folder in methods.items()
+        f"results/benchmark/{method}/{repository}/table.md"
         for repository in REPOSITORIES
-        if in_tree(repository) and Path(folder, repository).is_dir()
+        for method in (*methods_for(repository), *methods_for(repository, odometry=True))
     ]
     if not tables:
         raise WorkflowError(

@@ -1,18 +1,21 @@
-"""Score the predictions of one method on one release tree."""
+"""Score the depth maps of one method on one release tree."""
 
 from pathlib import Path
 
 from card.artifacts import logged
 from card.benchmark.evaluate import evaluate
+from card.benchmark.frames import Method
 
 with logged(Path(snakemake.log[0])):
+    given = snakemake.params.method
     evaluate(
         release=Path(snakemake.params.tree),
-        split=snakemake.params.split,
-        method=snakemake.wildcards.method,
-        predictions=Path(snakemake.params.predictions),
-        out=Path(snakemake.output.scores),
-        table=Path(snakemake.output.table),
+        split=given["split"],
+        method=Method(
+            snakemake.wildcards.method, Path(given["predictions"]), given["space"], given["unit_m"]
+        ),
+        task=given["task"],
+        out=Path(snakemake.params.out),
         report=Path(snakemake.output.report),
         settings=snakemake.params.cfg["settings"],
         gates=snakemake.params.cfg["gates"],

@@ -1,5 +1,1 @@
-"""Evaluation of depth predictions on a release."""
-
-from card.benchmark.evaluate import evaluate
-
-__all__ = ["evaluate"]
+"""Evaluation of depth, completion and odometry on a release."""

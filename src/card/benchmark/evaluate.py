@@ -1,89 +1,118 @@
-"""Stage `benchmark`: score a method's depth predictions on one split of a release."""
+"""Stage `benchmark`: score a method's depth maps on one split of a release."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from card.artifacts import atomic_file, progress, read_json, read_table, write_json, write_report
-from card.benchmark.depth_metrics import METRICS
-from card.benchmark.frame_scores import REGIONS, SCALINGS, Score, frame_scores
-from card.benchmark.predictions import Frame, check_complete, prediction_path, read_prediction
-from card.benchmark.table import markdown
-from card.errors import CardError
-from card.geometry import CameraModel, from_json, rasterize, transform
-from card.packaging.reader import SPLITS, Release
+from card.artifacts import atomic_folder, progress, write_json, write_report
+from card.benchmark.completion import input_pixels, sparse_depth
+from card.benchmark.frame_scores import (
+    INPUT_PIXELS,
+    SCALINGS,
+    Evaluated,
+    evaluated_pixels,
+    frame_scores,
+    slopes,
+)
+from card.benchmark.frames import (
+    CLASSES,
+    Loaded,
+    Method,
+    Selection,
+    SequenceView,
+    SequenceViews,
+    key,
+    load,
+    loaded,
+    select,
+)
+from card.benchmark.pixel_metrics import median_scale
+from card.benchmark.plausible import PROBES, check_camera, check_unit
+from card.benchmark.results import Results
+from card.benchmark.tables import markdown
+from card.packaging.reader import Release
+
+#: Completion is metric: its input gives the scale.
+TASKS = {"depth": (SCALINGS, INPUT_PIXELS[:1]), "completion": (SCALINGS[:1], INPUT_PIXELS)}
 
 
 def evaluate(
     *,
     release: Path,
     split: str,
-    method: str,
-    predictions: Path,
+    method: Method,
+    task: str,
     out: Path,
-    table: Path,
     report: Path,
     settings: Mapping[str, Any],
     gates: Sequence[Mapping[str, Any]] = (),
-) -> None:
-    """Score the depth maps of one method; full images and label boxes, as predicted and median-scaled.
+) -> dict[str, Any]:
+    """Score the depth maps of one method, and return the document `evaluation`.
 
     Parameters
     ----------
-    release : tree of a release; split : one of its splits. method : what its results are called.
-    predictions : folder of ``<sequence>/<frame:06d>.npy``: depth (H, W) in metres, floats, original image
-        space, 0 or NaN where there is none. One a frame that has ground truth; none of other splits.
-    out : document `evaluation`; table : the same as Markdown.
+    release : tree of a release; split : one of its splits.
+    task : ``depth``: full images and boxes, as predicted and scaled to the truth's median. ``completion``: as
+        predicted, with and without the pixels whose truth is the sweep that was the input.
+    out : folder with ``evaluation.json``, ``table.md``, ``frames.parquet``, ``boxes.parquet`` and
+        ``distances.parquet``.
 
-    CardError for a missing or extra prediction, one of the wrong size or type, infinite or negative depth.
+    CardError for missing or extra predictions, files that cannot be read, a wrong size, infinite or negative
+    depth, another unit or another camera than declared.
     """
-    if split not in SPLITS:
-        raise CardError("unknown split", found=split, wanted=" or ".join(SPLITS))
     opened = Release(release)
-    rows = opened.frames(split)
-    evaluated = [row for row in rows if row["has_ground_truth"]]
-    check_complete(predictions, map(_key, evaluated), map(_key, rows))
+    selection = select(opened, split, method, settings["coverage_flags"])
+    views = SequenceViews(opened, method.space)
+    _check_plausible(opened, selection, method, views, settings)
 
-    scores: list[Score] = []
-    boxes = without_road = 0
-    for row, road, camera in progress(_with_road(opened, evaluated), "evaluate", len(evaluated)):
-        frame = _key(row)
-        truth = rasterize(opened.points(*frame), camera)
-        labels = [box[1:] for box in opened.boxes(*frame) or ()]
-        prediction = read_prediction(prediction_path(predictions, frame), camera)
-        scores += frame_scores(truth, prediction, camera, road, labels, settings)
-        boxes += len(labels)
-        without_road += road is None
+    scalings, variants = TASKS[task]
+    results = Results(scalings, settings)
+    counts = dict.fromkeys(("boxes", "empty_boxes", "pixels", "pixels_out_of_view", "frames_without_road"), 0)
+    frames = loaded(opened, selection, method, views)
+    for frame, view in progress(frames, "evaluate", len(selection.rows)):
+        given, unseen = _evaluated(frame, view, settings)
+        counts["pixels_out_of_view"] += unseen
+        counts["pixels"] += given.truth.size
+        counts["frames_without_road"] += frame.road_from_camera is None
+        size = (view.view.camera.width, view.view.camera.height)
+        boxes = [box[1:] for box in frame.boxes]
+        classes = [CLASSES[int(box[0])] for box in frame.boxes]
+        for variant in variants:
+            part = given if variant == "all" else given.part(_not_input(opened, frame, given, settings))
+            scores = frame_scores(part, boxes, size, scalings, settings)
+            results.add(frame.row, classes, scores, variant)
+            if variant == "all":
+                counts["boxes"] += len(boxes)
+                counts["empty_boxes"] += int(np.count_nonzero(np.isnan(scores.box_depth)))
 
-    about = read_json(release / "release.json", "release")
-    once = [score for score in scores if score.scaling == "none"]
     document = {
         "schema": "evaluation",
-        "method": method,
-        "repository": about["repository"],
-        "version": about["version"],
+        "task": task,
+        "method": method.name,
+        "space": method.space,
+        "repository": opened.about["repository"],
+        "version": opened.about["version"],
         "split": split,
-        "settings": settings,
+        "settings": {name: value for name, value in settings.items() if name not in ("methods", "split")},
         "counts": {
-            "frames": len(evaluated),
-            "frames_without_truth": len(rows) - len(evaluated),
-            "frames_without_road": without_road,
-            "boxes": boxes,
-            "empty_boxes": sum(score.region == "boxes" and score.pixels == 0 for score in once),
-            "pixels": sum(score.pixels for score in once if score.region == "full"),
+            "sequences": len({row["sequence"] for row in selection.rows}),
+            "frames": len(selection.rows),
+            "frames_without_truth": selection.without_truth,
+            "frames_below_coverage": selection.below_coverage,
+            **counts,
         },
-        "rows": [_mean(scores, region, scaling) for region in REGIONS for scaling in SCALINGS],
+        "rows": results.summary(),
     }
-    write_json(out, document, "evaluation")
-    with atomic_file(table) as partial:
-        partial.write_text(markdown(document), encoding="utf-8")
+    with atomic_folder(out) as partial:
+        results.write(partial)
+        write_json(partial / "evaluation.json", document, "evaluation")
+        (partial / "table.md").write_text(markdown(document), encoding="utf-8")
     write_report(
         report,
         stage="benchmark",
-        settings=settings,
+        settings=document["settings"],
         inputs={
             "members": release / "metadata" / "members.parquet",
             "frames": release / "metadata" / f"frames-{split}.parquet",
@@ -91,49 +120,39 @@ def evaluate(
         counts=document["counts"],
         gates=gates,
     )
+    return document
 
 
-def _key(row: Mapping[str, Any]) -> Frame:
-    return row["sequence"], row["frame"]
+def _evaluated(frame: Loaded, view: SequenceView, settings: Mapping[str, Any]) -> tuple[Evaluated, int]:
+    """The pixels of a frame that count, and how many the predicted image does not see."""
+    limits = (settings["min_depth_m"], settings["max_depth_m"])
+    pixels, truth = view.view.truth(frame.points, limits)
+    road = frame.road_from_camera
+    if view.space.name == "original":
+        return evaluated_pixels(view.view, pixels, truth, frame.prediction, road), 0
+    rays = view.view.rays[pixels]
+    depth, seen = view.space.sample(frame.prediction, rays)
+    given = Evaluated(pixels, truth, depth, slopes(rays, road))
+    return given.part(seen), int(np.count_nonzero(~seen))
 
 
-def _with_road(
-    release: Release, rows: Sequence[Mapping[str, Any]]
-) -> Iterator[tuple[Mapping[str, Any], NDArray[np.float64] | None, CameraModel]]:
-    """Each frame with ``road_from_camera`` (4, 4), None without a valid road plane, and its left camera."""
-    sequence = None
-    for row in rows:
-        if row["sequence"] != sequence:
-            sequence = row["sequence"]
-            calibration = release.calibration(sequence)
-            camera = CameraModel.from_json(calibration["cameras"]["camera_left"])
-            rig_from_camera = from_json(calibration["extrinsics"]["rig_from_camera_left"])
-            planes = _road_planes(release.tree / "sequences" / sequence / "road_planes.parquet")
-        road_from_rig = planes.get(row["frame"])
-        yield row, None if road_from_rig is None else road_from_rig @ rig_from_camera, camera
+def _not_input(release: Release, frame: Loaded, given: Evaluated, settings: Mapping[str, Any]) -> Any:
+    sparse = sparse_depth(release, frame.row)
+    return ~input_pixels(given.pixels, given.truth, sparse, settings["input_tolerance_m"])
 
 
-def _road_planes(path: Path) -> dict[int, NDArray[np.float64]]:
-    """``road_from_rig`` (4, 4) by frame; empty for a sequence without wheels."""
-    if not path.is_file():
-        return {}
-    return {
-        row["frame"]: transform(
-            [row[axis] for axis in ("x", "y", "z")], [row[axis] for axis in ("qw", "qx", "qy", "qz")]
-        )
-        for row in read_table(path, "road_planes").to_pylist()
-        if row["valid"]
-    }
-
-
-def _mean(scores: Sequence[Score], region: str, scaling: str) -> dict[str, Any]:
-    """Mean over images or boxes but those without pixels and, for heights, without a road."""
-    chosen = [score.metrics for score in scores if (score.region, score.scaling) == (region, scaling)]
-    names = list(chosen[0]) if chosen else [*METRICS, "height_abs_diff", "height_rmse"]
-    means = {}
-    for name in names:
-        values = np.array([metrics[name] for metrics in chosen])
-        known = values[~np.isnan(values)]
-        means[name] = float(known.mean()) if known.size else None
-    samples = sum(not np.isnan(metrics["abs_rel"]) for metrics in chosen)
-    return {"region": region, "scaling": scaling, "samples": samples, "metrics": means}
+def _check_plausible(
+    release: Release, selection: Selection, method: Method, views: SequenceViews, settings: Mapping[str, Any]
+) -> None:
+    """CardError where a few frames, spread over the split, show another unit or camera than declared."""
+    step = max(1, len(selection.rows) // PROBES)
+    probes, ratios = [], []
+    for row in selection.rows[::step][:PROBES]:
+        view = views.of(row["sequence"])
+        frame = load(release, row, selection.files[key(row)], method, view)
+        given, _ = _evaluated(frame, view, settings)
+        if (given.prediction > 0).any():
+            ratios.append(1 / median_scale(given.truth, given.prediction))
+        probes.append((frame.prediction, frame.points, view.rig))
+    check_unit(ratios, method.predictions)
+    check_camera(probes, method.space, method.predictions)

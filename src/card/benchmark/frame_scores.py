@@ -1,4 +1,4 @@
-"""All scores of one frame: full image and boxes, as predicted and scaled to the truth's median."""
+"""All scores of one frame: the full image, each box, each range of distance."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -7,57 +7,116 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from card.benchmark.boxes import box_mask
-from card.benchmark.depth_metrics import clip_prediction, depth_metrics, median_scale, truth_mask
-from card.benchmark.height_metrics import height_metrics, heights, pixel_rays
-from card.geometry import CameraModel
+from card.benchmark import pixel_metrics
+from card.benchmark.boxes import box_span, inside
+from card.benchmark.pixel_metrics import median_scale
+from card.benchmark.truth import View, compiled
 
 Array = NDArray[np.float64]
+Pixels = NDArray[np.int64]
 
-REGIONS = ("full", "boxes")
 SCALINGS = ("none", "median")
+INPUT_PIXELS = ("all", "without")
 
 
 @dataclass(frozen=True)
-class Score:
-    """Metrics of the full image or of one box: NaN where no pixel counts, heights NaN without a road."""
+class Evaluated:
+    """The pixels of one frame that count, and what was predicted for them.
 
-    region: str
-    scaling: str
-    pixels: int
-    metrics: Mapping[str, float]
+    pixels (M,) flat; truth, prediction (M,) metres; slope (M,) rise of height with depth, NaN without a road.
+    """
+
+    pixels: Pixels
+    truth: Array
+    prediction: Array
+    slope: Array
+
+    def part(self, chosen: Any) -> "Evaluated":
+        """Some of the pixels, by a mask (M,) or their indices."""
+        return Evaluated(self.pixels[chosen], self.truth[chosen], self.prediction[chosen], self.slope[chosen])
+
+
+@dataclass(frozen=True)
+class FrameScores:
+    """Sums over pixels, `SUMS` in the last axis, for each scaling in the first.
+
+    full (S, K); distances (S, D, K); boxes (S, B, K) and the median depth of each box, NaN for an empty one;
+    scales (S,).
+    """
+
+    scales: Array
+    full: Array
+    distances: Array
+    boxes: Array
+    box_depth: Array
+
+
+def evaluated_pixels(
+    view: View,
+    pixels: Pixels,
+    truth: Array,
+    prediction: Any,
+    road_from_camera: Array | None,
+    plain: bool = False,
+) -> Evaluated:
+    """What a prediction (H, W) in the original image says at the pixels (M,) that have truth (M,), metres.
+
+    road_from_camera : (4, 4); Z is height over the road. None where the frame has no road plane. A height
+    h = d (n . r) + offset changes with depth by its slope n . r alone.
+    """
+    kernels = None if plain else compiled()
+    flat = np.ascontiguousarray(prediction).reshape(-1)
+    if kernels is None:
+        slope = slopes(view.rays[pixels], road_from_camera)
+        return Evaluated(pixels, truth, flat[pixels].astype(np.float64), slope)
+    return Evaluated(pixels, truth, *kernels.gather(pixels, flat, view.rays, road_normal(road_from_camera)))
+
+
+def road_normal(road_from_camera: Array | None) -> Array:
+    """Normal (3,) of the road in the camera's axes; NaN without a road."""
+    return np.full(3, np.nan) if road_from_camera is None else road_from_camera[2, :3].copy()
+
+
+def slopes(rays: Array, road_from_camera: Array | None) -> Array:
+    """Rise (M,) of the height over the road with depth along rays (M, 2) with z = 1; NaN without a road."""
+    n = road_normal(road_from_camera)
+    rise: Array = rays[:, 0] * n[0] + rays[:, 1] * n[1] + n[2]
+    return rise
 
 
 def frame_scores(
-    truth: Array,
-    prediction: Array,
-    camera: CameraModel,
-    road_from_camera: Array | None,
+    given: Evaluated,
     boxes: Sequence[Sequence[float]],
+    size: tuple[int, int],
+    scalings: Sequence[str],
     settings: Mapping[str, Any],
-) -> list[Score]:
-    """Scores of a prediction (H, W) against the truth (H, W), metres; NaN is no truth.
+    plain: bool = False,
+) -> FrameScores:
+    """Scores of a frame's pixels; boxes : YOLO boxes, relative; size : width and height of the image.
 
-    road_from_camera : (4, 4), or None where the frame has no road plane. boxes : YOLO boxes, relative.
-    A box is scaled by the median of its whole image.
+    A box is scaled by the medians of its whole image.
     """
-    limits = settings["min_depth_m"], settings["max_depth_m"]
-    mask = truth_mask(truth, *limits)
-    d, predicted = truth[mask], prediction[mask]
-    rays = pixel_rays(camera)[mask]
-    regions = [("full", np.ones(d.size, dtype=np.bool_))]
-    regions += [("boxes", box_mask(box, camera.width, camera.height)[mask]) for box in boxes]
+    limits = (settings["min_depth_m"], settings["max_depth_m"])
+    thresholds = tuple(settings["height_thresholds_m"])
+    drop = settings["profile"] == "paper"
+    edges = np.array(settings["distance_edges_m"], dtype=np.float64)
+    kernels = None if plain else compiled()
+    sums = pixel_metrics.pixel_sums if kernels is None else kernels.pixel_sums
+    median = median_scale if kernels is None else kernels.median_scale
+    scales = np.array(
+        [median(given.truth, given.prediction) if name == "median" else 1.0 for name in scalings]
+    )
 
-    scores = []
-    for scaling in SCALINGS:
-        p = predicted * (median_scale(d, predicted) if scaling == "median" else 1.0)
-        for region, inside in regions:
-            depth = depth_metrics(d[inside], p[inside], *limits)
-            # Without a road plane there are no heights, as over no pixels.
-            over = inside if road_from_camera is not None else np.zeros_like(inside)
-            road = np.eye(4) if road_from_camera is None else road_from_camera
-            h_true = heights(d[over], rays[over], road)
-            h = heights(clip_prediction(p[over], *limits), rays[over], road)
-            height = height_metrics(h_true, h, settings["height_thresholds_m"])
-            scores.append(Score(region, scaling, int(inside.sum()), {**depth, **height}))
-    return scores
+    def summed(e: Evaluated, edges_m: Array) -> Array:
+        found: Array = sums(e.truth, e.prediction, e.slope, scales, edges_m, limits, thresholds, drop)
+        return found
+
+    distances = summed(given, edges)
+    in_boxes = np.zeros((len(scales), len(boxes), distances.shape[-1]))
+    box_depth = np.full(len(boxes), np.nan)
+    for index, box in enumerate(boxes):
+        part = given.part(inside(given.pixels, box_span(box, *size), size[0]))
+        if part.truth.size:
+            in_boxes[:, index] = summed(part, edges[:0])[:, 0]
+            box_depth[index] = np.median(part.truth)
+    return FrameScores(scales, distances.sum(axis=1), distances, in_boxes, box_depth)

@@ -57,11 +57,11 @@ class CameraModel:
         p = np.asarray(points, dtype=np.float64)
         front = p[..., 2:] > 0
         normalized = np.where(front, p[..., :2], np.nan) / np.where(front, p[..., 2:], 1.0)
-        folded = np.sum(normalized**2, axis=-1, keepdims=True) >= self._max_radius**2
+        folded = np.sum(normalized**2, axis=-1, keepdims=True) >= self.max_radius**2
         return self.distort(np.where(folded, np.nan, normalized)) * (self.fx, self.fy) + (self.cx, self.cy)
 
     @cached_property
-    def _max_radius(self) -> float:
+    def max_radius(self) -> float:
         """Normalised radius up to which r (1 + k1 r^2 + k2 r^4 + k3 r^6) grows."""
         k1, k2, _, _, k3 = self.distortion
         squared = np.roots([7 * k3, 5 * k2, 3 * k1, 1.0])

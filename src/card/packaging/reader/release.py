@@ -149,6 +149,18 @@ class Release:
             moving |= {} if road is None else {"road": inverse(road)}
         return self.rig(sequence).transform(name, moving)
 
+    def road(self, sequence: str, frame: int) -> Array | None:
+        """``road_from_camera_left`` (4, 4) of a frame; None where its road plane is not known."""
+        if frame not in self._road(sequence):
+            return None
+        return self.transform("road_from_camera_left", sequence, frame)
+
+    def poses(self, sequence: str) -> list[dict[str, Any]]:
+        """Rows of the sequence's ``poses.json``, in order of time; empty where it has none."""
+        path = self._files.local(f"sequences/{sequence}/poses.json")
+        rows: list[dict[str, Any]] = read_json(path, "poses")["poses"] if path.is_file() else []
+        return rows
+
     def _member(self, sequence: str, frame: int, modality: str) -> tuple[Any, ...]:
         try:
             return self._members[sequence, modality, frame]
@@ -159,11 +171,9 @@ class Release:
 
     def _poses(self, sequence: str) -> dict[tuple[str, int], Array]:
         if sequence not in self._moments:
-            path = self._files.local(f"sequences/{sequence}/poses.json")
-            rows = read_json(path, "poses")["poses"] if path.is_file() else []
             self._moments[sequence] = {
                 (row["sensor"], row["index"]): transform(row["translation_m"], row["rotation_wxyz"])
-                for row in rows
+                for row in self.poses(sequence)
             }
         return self._moments[sequence]
 
