@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from sklearn.metrics import mean_absolute_error, mean_absolute_percentage_error, root_mean_squared_error
 
@@ -78,6 +78,7 @@ def by_the_book(truth: np.ndarray, prediction: np.ndarray, slope: np.ndarray) ->
 
 
 @BOTH
+@settings(deadline=None)  # the first example compiles
 @given(st.integers(0, 10_000))
 def test_metrics_equal_the_formulas(form: Any, seed: int) -> None:
     truth, prediction = random_depths(seed, 60)
@@ -107,6 +108,7 @@ def test_metrics_equal_scikit_learn(form: Any) -> None:
 
 @pytest.mark.parametrize("drop", [False, True])
 @pytest.mark.parametrize("road", [True, False])
+@settings(deadline=None)  # the first example compiles
 @given(st.integers(0, 10_000))
 def test_the_compiled_form_is_the_plain_one(road: bool, drop: bool, seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -114,8 +116,8 @@ def test_the_compiled_form_is_the_plain_one(road: bool, drop: bool, seed: int) -
     prediction[rng.random(200) < 0.1] = rng.choice([0.0, np.nan, 1e-3, 500.0])
     slope = rng.normal(0, 0.2, 200) if road else np.full(200, np.nan)
     scales, edges = np.array([1.0, rng.uniform(0.3, 3)]), np.array([5.0, 20.0, 41.0])
-    given = (truth, prediction, slope, scales, edges, RANGE, TAUS, drop)
-    plain, compiled = pixel_metrics.pixel_sums(*given), kernels.pixel_sums(*given)
+    asked = (truth, prediction, slope, scales, edges, RANGE, TAUS, drop)
+    plain, compiled = pixel_metrics.pixel_sums(*asked), kernels.pixel_sums(*asked)
     np.testing.assert_allclose(compiled, plain, rtol=1e-12, atol=1e-12)
     assert kernels.median_scale(truth, prediction) == pixel_metrics.median_scale(truth, prediction)
 
@@ -262,6 +264,7 @@ def test_without_a_road_there_are_depths_but_no_heights() -> None:
     assert all(math.isnan(found[name]) for name in METRICS if name.startswith("height"))
 
 
+@settings(deadline=None)
 @given(st.floats(0.2, 5.0))
 def test_median_scaling_takes_out_any_common_factor(factor: float) -> None:
     truth, prediction = frame()
@@ -287,7 +290,9 @@ def test_units_change_with_the_unit_of_length() -> None:
     truth, prediction = random_depths(8)
     slope = np.random.default_rng(1).normal(0, 0.2, truth.size)
     sums = [
-        pixel_metrics.pixel_sums(k * truth, k * prediction, slope, np.ones(1), NO_EDGES, (0, 1e9), TAUS, False)
+        pixel_metrics.pixel_sums(
+            k * truth, k * prediction, slope, np.ones(1), NO_EDGES, (0, 1e9), TAUS, False
+        )
         for k in (1.0, 100.0)
     ]
     metres, centimetres = (metrics_of(s) for s in sums)

@@ -12,7 +12,10 @@ def add(commands: Any) -> None:
     parser = commands.add_parser("evaluate", help="score a method's predictions on a release")
     parser.add_argument("--release", type=Path, required=True, help="tree of the release")
     parser.add_argument(
-        "--predictions", type=Path, required=True, help="folder <sequence>/<frame:06d>.<format>"
+        "--predictions",
+        type=Path,
+        required=True,
+        help="<sequence>/<frame:06d>.{npz,npy,png,exr}; <sequence>.txt for odometry",
     )
     parser.add_argument("--task", choices=("depth", "completion", "odometry"), default="depth")
     parser.add_argument("--split", help="test, or zero_shot for odometry, if left out")
@@ -30,6 +33,7 @@ def _evaluate(options: argparse.Namespace) -> None:
     from card.artifacts.schemas import with_defaults
     from card.benchmark.evaluate import evaluate
     from card.benchmark.frames import Method
+    from card.benchmark.odometry import evaluate_odometry
 
     name = options.method or options.predictions.resolve().name
     out = options.out or Path(f"evaluation-{name}")
@@ -41,14 +45,25 @@ def _evaluate(options: argparse.Namespace) -> None:
         settings = with_defaults(given, load_schema("settings/benchmark"))
     if options.profile:
         settings["profile"] = options.profile
-    method = Method(name, options.predictions, options.space, options.unit)
-    evaluate(
-        release=options.release,
-        split=options.split or "test",
-        method=method,
-        task=options.task,
-        out=out,
-        report=out.with_name(f"{out.name}.report.json"),
-        settings=settings,
-    )
+    report = out.with_name(f"{out.name}.report.json")
+    if options.task == "odometry":
+        evaluate_odometry(
+            release=options.release,
+            split=options.split or "zero_shot",
+            method=name,
+            predictions=options.predictions,
+            out=out,
+            report=report,
+            settings=settings,
+        )
+    else:
+        evaluate(
+            release=options.release,
+            split=options.split or "test",
+            method=Method(name, options.predictions, options.space, options.unit),
+            task=options.task,
+            out=out,
+            report=report,
+            settings=settings,
+        )
     print((out / "table.md").read_text(encoding="utf-8"))

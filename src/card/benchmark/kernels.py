@@ -11,11 +11,10 @@ import numpy as np
 
 from card.benchmark.pixel_metrics import DELTA_BASE, SUMS
 
-T1, T2, T3 = DELTA_BASE, DELTA_BASE**2, DELTA_BASE**3
-N_SUMS = len(SUMS)
 #: Float64 bits that tell a value's bin in the first pass of `median`.
 BIN_BITS, REST_BITS = 18, 45
 
+#: A kernel's cache knows its own file only: what is defined elsewhere comes in as an argument.
 kernel = numba.njit(nogil=True, cache=True, error_model="numpy")
 
 
@@ -102,8 +101,25 @@ def gather(pixels: Any, prediction: Any, rays: Any, normal: Any) -> Any:
     return p, slope
 
 
-@kernel
 def pixel_sums(
+    truth: Any,
+    prediction: Any,
+    slope: Any,
+    scales: Any,
+    edges_m: Any,
+    limits: Any,
+    thresholds_m: Any,
+    drop: bool,
+) -> Any:
+    """As `card.benchmark.pixel_metrics.pixel_sums`, in one pass."""
+    out = np.zeros((scales.size, edges_m.size + 1, len(SUMS)))
+    ratios = (DELTA_BASE, DELTA_BASE**2, DELTA_BASE**3)
+    _add_pixels(truth, prediction, slope, scales, edges_m, limits, thresholds_m, drop, ratios, out)
+    return out
+
+
+@kernel
+def _add_pixels(
     truth: Any,
     prediction: Any,
     slope: Any,
@@ -112,11 +128,12 @@ def pixel_sums(
     limits: Any,
     thresholds_m: Any,
     drop: bool,
-) -> Any:
-    """As `card.benchmark.pixel_metrics.pixel_sums`, in one pass."""
+    ratios: Any,
+    out: Any,
+) -> None:
     near, far = limits
     tau_1, tau_2 = thresholds_m
-    out = np.zeros((scales.size, edges.size + 1, N_SUMS))
+    t1, t2, t3 = ratios
     log_scales = np.log(scales)
     for i in range(truth.size):
         d = truth[i]
@@ -130,7 +147,7 @@ def pixel_sums(
         for s in range(scales.size):
             p = raw * scales[s] if given else 0.0
             valid = near <= p <= far
-            row = out[s, part]
+            row = out[s, part]  # in the order of SUMS
             row[0] += 1
             row[1] += valid
             if drop and not valid:
@@ -147,9 +164,9 @@ def pixel_sums(
             row[4] += squared * inverse_d
             row[5] += squared
             row[6] += log * log
-            row[7] += (c < T1 * d) & (d < T1 * c)
-            row[8] += (c < T2 * d) & (d < T2 * c)
-            row[9] += (c < T3 * d) & (d < T3 * c)
+            row[7] += (c < t1 * d) & (d < t1 * c)
+            row[8] += (c < t2 * d) & (d < t2 * c)
+            row[9] += (c < t3 * d) & (d < t3 * c)
             row[10] += absolute
             row[11] += abs(inverse)
             row[12] += inverse * inverse
@@ -161,7 +178,6 @@ def pixel_sums(
             else:
                 row[15] += h < tau_1
                 row[16] += h < tau_2
-    return out
 
 
 @kernel

@@ -4,7 +4,6 @@ Paper, supplement, 'Depth Evaluation' and 'Height Evaluation Metrics'; 'Depth Co
 This is the plain form; `card.benchmark.kernels` computes the same sums in one pass.
 """
 
-
 import numpy as np
 from numpy.typing import NDArray
 
