@@ -282,7 +282,10 @@ def evaluations(wildcards):
     tables = [
         f"results/benchmark/{method}/{repository}/table.md"
         for repository in REPOSITORIES
-        for method in (*methods_for(repository), *methods_for(repository, odometry=True))
+        for method in (
+            *methods_for(repository),
+            *methods_for(repository, odometry=True),
+        )
     ]
     if not tables:
         raise WorkflowError(
