@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from card.report.style import QUIET, figure
+from card.artifacts.figures import QUIET, figure
 
 BAR = "#3f6f8f"
 LIDARS = {"front": "#3f6f8f", "rear": "#c98a3a"}

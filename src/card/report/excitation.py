@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from card.report.style import INK, QUIET, figure
+from card.artifacts.figures import INK, QUIET, figure
 
 Array = NDArray[np.float64]
 

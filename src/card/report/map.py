@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from card.artifacts.figures import INK, bare, figure
 from card.geometry import Trajectory
-from card.report.style import INK, bare, figure
 
 Array = NDArray[np.float64]
 

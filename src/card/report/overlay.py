@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from card.artifacts.figures import bare, figure
 from card.geometry import CameraModel, rasterize
-from card.report.style import bare, figure
 
 PANEL_PX = 640
 DEPTH_RANGE_M = (3.0, 80.0)
