@@ -38,20 +38,21 @@ class Box:
 
 def private_boxes(seen: NDArray[np.int32], things: Sequence[Thing]) -> list[Box]:
     """Boxes around the visible pixels of faces and plates in an image of thing indices (H, W)."""
+    from scipy.ndimage import find_objects
+
     boxes = []
-    for index in np.unique(seen[seen >= 0]):
-        kind = things[index].kind
-        if kind not in ("face", "plate"):
+    for index, window in enumerate(find_objects(seen + 1)):
+        if window is None or things[index].kind not in ("face", "plate"):
             continue
-        rows, columns = np.nonzero(seen == index)
+        rows, columns = window
         box = Box(
-            kind,
-            int(index),
-            columns.min() - 0.5,
-            rows.min() - 0.5,
-            columns.max() + 0.5,
-            rows.max() + 0.5,
-            len(rows),
+            things[index].kind,
+            index,
+            columns.start - 0.5,
+            rows.start - 0.5,
+            columns.stop - 0.5,
+            rows.stop - 0.5,
+            int(np.count_nonzero(seen[window] == index)),
         )
         if _worth_labelling(box):
             boxes.append(box)
@@ -63,8 +64,9 @@ def road_boxes(
 ) -> list[Box]:
     """Boxes around the whole extent, cut at the image's edge, of the bumps and potholes in sight."""
     boxes = []
+    pixels_of = np.bincount(seen[seen >= 0], minlength=len(road.irregularities))
     for index, thing in enumerate(road.irregularities):
-        visible = int(np.count_nonzero(seen == index))
+        visible = int(pixels_of[index])
         if thing.kind not in _LABELLED or visible < _FEWEST_PX:
             continue
         points = apply(inverse(world_from_camera), outline(road, thing))

@@ -118,7 +118,9 @@ class Lidar:
         start = np.einsum("nij,j->ni", pose[..., :3], origin) + pose[..., 3]
         return start, np.einsum("nij,nj->ni", pose[..., :3], rays)
 
-    def _distance(self, true: Array, ring: NDArray[np.int64], rng: np.random.Generator) -> Array:
+    def _distance(
+        self, true: NDArray[np.float32], ring: NDArray[np.int64], rng: np.random.Generator
+    ) -> Array:
         """Ranges (N,) as reported: biased, noisy and quantised; inf stays."""
         bias = self._errors.range_offset_m + self._errors.channel_range_offset_m[ring]
         noisy = true - bias + rng.normal(0, NOISE_M, len(true))

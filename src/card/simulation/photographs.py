@@ -3,11 +3,11 @@
 from pathlib import Path
 
 import numpy as np
-from PIL import Image
 
 from card.artifacts import write_table
 from card.recording.paths import image_path
 from card.simulation.camera import Camera
+from card.simulation.exposure import jpeg
 from card.simulation.labels import CLASSES, Box, private_boxes, road_boxes, yolo_lines
 from card.simulation.raycast import Scene, Tracer
 from card.simulation.rig import CAMERAS, STEREO_DELAY_NS
@@ -15,7 +15,6 @@ from card.simulation.shading import Shader
 from card.simulation.world import World
 
 _FRAME_NS = 100_000_000
-_QUALITY = 92
 #: One image in so many was not looked at by the annotators.
 _UNREVIEWED_EVERY = 7
 
@@ -34,12 +33,9 @@ class Photographer:
     """Both cameras of a world's car."""
 
     def __init__(self, world: World, tracer: Tracer, ego: Scene) -> None:
-        self._world, self._tracer = world, tracer
-        self._shader = Shader(tracer, world.things, world.drive.section, world.sun)
-        self._cameras = {
-            name: Camera(world.rig.cameras[name], world.rig.rig_from[name], ego, world.sun)
-            for name in CAMERAS
-        }
+        self._world = world
+        shader = Shader(tracer, world.things, world.drive.section)
+        self._cameras = {name: Camera(world, tracer, shader, ego, name) for name in CAMERAS}
 
     def photograph(self, name: str, numbers: range, recording: Path) -> list[Shown]:
         """Write images ``numbers`` of one camera; what a label could be drawn around in them."""
@@ -47,13 +43,10 @@ class Photographer:
         model, pose = world.rig.cameras[name], world.rig.rig_from[name]
         for number in numbers:
             t_ns, noise = exposures(world, name)[number], world.rng(f"noise of {name} {number}")
-            world_from_rig = world.path.at(t_ns)
-            picture = self._cameras[name].shoot(self._tracer, self._shader, world_from_rig, t_ns, noise)
-            Image.fromarray(picture.rgb).save(
-                image_path(recording, name, t_ns), quality=_QUALITY, subsampling="4:2:0"
-            )
+            picture = self._cameras[name].shoot(t_ns, noise)
+            image_path(recording, name, t_ns).write_bytes(jpeg(picture.rgb))
             boxes = private_boxes(picture.thing, world.things)
-            boxes += road_boxes(picture.thing, world.road, model, world_from_rig @ pose)
+            boxes += road_boxes(picture.thing, world.road, model, world.path.at(t_ns) @ pose)
             found += [(name, t_ns, box) for box in boxes]
         return found
 

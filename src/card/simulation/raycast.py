@@ -26,12 +26,12 @@ class Mover:
 class Hits:
     """What rays met.
 
-    distance : (N,) m, inf for nothing.  triangle : (N,) int64 into the mesh, -1 for nothing.
+    distance : (N,) m, inf for nothing.  triangle : (N,) int32 into the mesh, -1 for nothing.
     barycentric : (N, 2) weights of the triangle's second and third corner.  normal : (N, 3), unit.
     """
 
-    distance: Array
-    triangle: NDArray[np.int64]
+    distance: NDArray[np.float32]
+    triangle: NDArray[np.int32]
     barycentric: NDArray[np.float32]
     normal: NDArray[np.float32]
 
@@ -47,22 +47,25 @@ class Scene:
             self._tensor(mesh.vertices.astype(np.float32)), self._tensor(mesh.triangles.astype(np.uint32))
         )
 
-    def cast(self, origins: ArrayLike, directions: ArrayLike) -> Hits:
-        """Hits of rays (N, 3), directions of unit length, all in the mesh's frame."""
-        rays = np.concatenate(np.broadcast_arrays(origins, directions), axis=1).astype(np.float32)
-        found = self._scene.cast_rays(self._tensor(rays), nthreads=1)
-        triangle = found["primitive_ids"].numpy()
+    def first(self, rays: NDArray[np.float32]) -> Hits:
+        """Hits of rays (N, 6): origin and unit direction, in the mesh's frame."""
+        found = self._scene.cast_rays(self._tensor.from_numpy(rays), nthreads=1)
         return Hits(
-            found["t_hit"].numpy().astype(np.float64),
-            np.where(triangle == np.iinfo(np.uint32).max, -1, triangle.astype(np.int64)),
+            found["t_hit"].numpy(),
+            found["primitive_ids"].numpy().view(np.int32),  # what met nothing has the last id, as -1 is
             found["primitive_uvs"].numpy(),
             found["primitive_normals"].numpy(),
         )
 
-    def blocked(self, origins: ArrayLike, directions: ArrayLike) -> NDArray[np.bool_]:
-        """Whether rays (N, 3) meet anything (N,)."""
+    def cast(self, origins: ArrayLike, directions: ArrayLike) -> Hits:
+        """Hits of rays (N, 3), directions of unit length, all in the mesh's frame."""
         rays = np.concatenate(np.broadcast_arrays(origins, directions), axis=1).astype(np.float32)
-        return np.asarray(self._scene.test_occlusions(self._tensor(rays), nthreads=1).numpy())
+        return self.first(rays)
+
+    def blocked(self, rays: NDArray[np.float32]) -> NDArray[np.bool_]:
+        """Whether rays (N, 6) meet anything within their length (N,)."""
+        blocked = self._scene.test_occlusions(self._tensor.from_numpy(rays), tfar=1.0, nthreads=1)
+        return np.asarray(blocked.numpy())
 
     def distance(self, points: Array) -> Array:
         """Distance (N,) of points (N, 3) to the nearest surface, m."""
@@ -74,20 +77,23 @@ class Tracer:
     """The static world and all movers.
 
     all : every body's mesh in one, static first, to look up what was hit.  static : the static scene.
+    first_triangle : (M,) of each mover in `all`.
     """
 
     def __init__(self, static: Mesh, movers: Sequence[Mover]) -> None:
         self.all = join([static, *(m.mesh for m in movers)])
-        self.static = Scene(static)
+        self.static, self.movers = Scene(static), list(movers)
         self.static_triangles = len(static.triangles)
-        self._movers = Gallery([m.mesh for m in movers], [m.path for m in movers]) if movers else None
+        sizes = [self.static_triangles, *(len(m.mesh.triangles) for m in movers)]
+        self.first_triangle = np.cumsum(sizes)[:-1]
+        self._gallery = Gallery([m.mesh for m in movers], [m.path for m in movers]) if movers else None
 
     def cast(self, origins: Array, directions: Array, t_ns: NDArray[np.int64]) -> Hits:
         """First hits of rays (N, 3) in world, directions of unit length, fired at times t_ns (N,)."""
         hits = self.static.cast(origins, directions)
-        if self._movers is None:
+        if self._gallery is None:
             return hits
-        found = self._movers.cast(origins, directions, t_ns)
+        found = self._gallery.cast(origins, directions, t_ns)
         # Far to near, so that the nearest mover is written last.
         order = np.argsort(-found.distance, kind="stable")
         order = order[found.distance[order] < hits.distance[found.ray[order]]]
@@ -97,10 +103,3 @@ class Tracer:
         hits.barycentric[ray] = found.barycentric[order]
         hits.normal[ray] = found.normal[order]
         return hits
-
-    def uv(self, hits: Hits, chosen: NDArray[np.intp]) -> NDArray[np.float32]:
-        """Texture coordinates (K, 2) of the chosen hits."""
-        corners = self.all.uv[self.all.triangles[hits.triangle[chosen]]]
-        b = hits.barycentric[chosen, :, None]
-        first = corners[:, 0]
-        return np.asarray(first + b[:, 0] * (corners[:, 1] - first) + b[:, 1] * (corners[:, 2] - first))
