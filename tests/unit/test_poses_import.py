@@ -260,7 +260,10 @@ def test_swapped_axes_are_named(drive: Path) -> None:
 
     spoil_imu(drive, swap)
     _, _, report = run(drive)
-    assert report["notes"] == ["gyro agrees with the trajectory if read as rad/s with axes (-y, x, z)"]
+    assert report["notes"] == [
+        "gyro agrees with the trajectory if read as rad/s with axes (-y, x, z)",
+        "accelerometer agrees with the trajectory if read with axes (-y, x, z)",
+    ]
 
 
 def test_a_trajectory_whose_up_is_not_gravity_shows(drive: Path) -> None:

@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from card.artifacts import Figure, read_json, read_table, write_json, write_report, write_table
+from card.estimation.imu import Imu, read_imu
 from card.geometry import Trajectory, from_json, inverse, quaternion_from_matrix
 from card.poses.anchor import anchor, tilt_deg, up_vector
 from card.poses.delivered import read_kitti, read_tum
-from card.poses.imu_checks import Imu, imu_figures, read_imu
+from card.poses.imu_checks import imu_figures
 from card.poses.members import pose_document, read_members
 from card.poses.plausibility import check_coverage, check_motion, check_upright
 from card.recording.description import read_description

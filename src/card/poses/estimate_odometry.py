@@ -1,0 +1,95 @@
+"""The stage `odometry`: from a recording to odometry.parquet."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from card.artifacts import Figure, read_json, read_table, write_report, write_table
+from card.errors import CardError
+from card.estimation.imu import read_imu
+from card.estimation.scans import Limits, Scans
+from card.poses.odometry import odometry_columns, plane_settings, run_odometry
+from card.poses.scan_checks import check_against_scans, check_imu
+from card.recording.description import read_description
+from card.recording.paths import imu_path
+
+
+def estimate_odometry(
+    *,
+    recording: Path,
+    calibration: Path,
+    bursts: Path,
+    odometry: Path,
+    report: Path,
+    settings: Mapping[str, Any],
+    gates: Sequence[Mapping[str, Any]],
+) -> None:
+    """Estimate the motion of a drive from its LiDARs and IMU, sweep by sweep.
+
+    Parameters
+    ----------
+    recording : folder with ``recording.yaml``, ``imu.parquet`` and the sweeps.
+    calibration, bursts : artifacts of schemas ``calibration`` and ``bursts``.
+    odometry, report : the files to write, of schemas ``odometry_states`` and ``report``.
+
+    Raises
+    ------
+    CardError
+        For an IMU with a gap, in other units or axes, or on another clock; for sweeps without a time a point.
+    """
+    imu = read_imu(read_table(imu_path(recording), "imu"))
+    check_imu(imu, settings["max_imu_gap_s"], imu_path(recording))
+    description = read_description(recording)
+    scans = open_scans(recording, bursts, calibration, settings)
+    figures, notes = check_against_scans(scans, imu, settings, plane_settings(settings), imu_path(recording))
+    steps = run_odometry(scans, imu, settings)
+    found = [step.found for step in steps[1:]]
+    registered = [registration for registration in found if registration is not None]
+    if not registered:
+        raise CardError("no sweep could be registered", where=recording)
+    seconds = np.diff([step.state.t_ns for step in steps]) * 1e-9
+    way = np.linalg.norm(np.diff([step.state.pose[:3, 3] for step in steps], axis=0), axis=1)
+    figures += [
+        Figure("length_m", float(way.sum()), "m", "way of the rig"),
+        Figure("registered_pct", 100 * len(registered) / len(found), "%", "sweeps that were registered"),
+        Figure(
+            "inlier_pct",
+            100 * float(np.median([r.inlier_fraction for r in registered])),
+            "%",
+            "points of a sweep that fit the map, median",
+        ),
+        Figure(
+            "plane_rms_mm",
+            1e3 * float(np.median([r.rms_m for r in registered])),
+            "mm",
+            "root mean square distance of those points from their planes, median",
+        ),
+        Figure("max_step_s", float(seconds.max()), "s", "longest time between sweeps"),
+    ]
+    write_table(odometry, odometry_columns(steps, scans), "odometry_states")
+    write_report(
+        report,
+        stage="odometry",
+        sequence=description["id"],
+        settings=settings,
+        inputs={"calibration": calibration, "bursts": bursts, "imu": imu_path(recording)},
+        counts={"sweeps": len(steps), "registered": len(registered)},
+        figures=figures,
+        gates=gates,
+        notes=notes,
+    )
+
+
+def open_scans(recording: Path, bursts: Path, calibration: Path, settings: Mapping[str, Any]) -> Scans:
+    """The sweeps of a recording that the settings choose."""
+    low, high = settings["azimuth_deg"]
+    return Scans(
+        recording,
+        read_table(bursts, "bursts"),
+        read_json(calibration, "calibration"),
+        read_description(recording)["sensors"],
+        settings["lidars"],
+        Limits(settings["min_range_m"], settings["max_range_m"], (low, high)),
+    )
