@@ -14,6 +14,7 @@ COMMANDS = (
     "card.packaging.commands.extract",
     "card.splits.command",
     "card.benchmark.command",
+    "card.simulation.command",
 )
 """Modules of one command each, with `add`, which adds it to the parser."""
 

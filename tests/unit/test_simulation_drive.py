@@ -159,6 +159,12 @@ def test_the_five_drives_are_what_the_demo_promises() -> None:
     assert [name for name, d in DRIVES.items() if d.night] == ["it_zero_shot"]
 
 
+def test_the_demo_s_sheet_knows_which_drives_are_at_night() -> None:
+    with (Path(__file__).parents[2] / "config" / "sequences.tsv").open() as lines:
+        light = {row["id"]: row["light"] for row in csv.DictReader(lines, delimiter="\t")}
+    assert {name: "night" if d.night else "day" for name, d in DRIVES.items()} == light
+
+
 def test_the_loop_is_600_m_driven_once_and_a_little_more() -> None:
     drive = drive_named("it_town_loop")
     assert drive.circuit is not None

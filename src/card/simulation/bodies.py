@@ -10,7 +10,9 @@ from card.simulation.surfaces import Surface
 
 Array = NDArray[np.float64]
 
-CAR_LENGTH_M, CAR_WIDTH_M = 4.4, 1.8
+CAR_LENGTH_M, CAR_WIDTH_M, CAR_WHEELBASE_M = 4.4, 1.8, 2.7
+#: Offset to the side and height of the joints of a walker 1.75 m tall.
+HIP_M, SHOULDER_M = (0.10, 0.92), (0.22, 1.42)
 EYE_HEIGHT_M = 1.60
 #: (2, 3): where a car's headlights are in its own frame, and ours in ``rig``; they shine along y.
 HEADLIGHTS_M = np.array([[-0.66, 2.22, 0.73], [0.66, 2.22, 0.73]])
@@ -34,7 +36,7 @@ def car(colour: ArrayLike, plates: tuple[int, int], *, lit: bool = True) -> Mesh
         _plate(np.array([0.0, -CAR_LENGTH_M / 2 - _PLATE_GAP_M, 0.70]), -1.0, plates[1]),
     ]
     for side in (-half + 0.02, half - 0.02):
-        for y in (-1.35, 1.35):
+        for y in (-CAR_WHEELBASE_M / 2, CAR_WHEELBASE_M / 2):
             parts.append(cylinder((side - 0.1, y, 0.33), (side + 0.1, y, 0.33), (0.33, 0.33), Surface.TYRE))
         for y, colour_lamp in ((-2.205, (1.0, 0.05, 0.05)), (2.205, (1.0, 1.0, 0.9))):
             x = 0.75 * side
@@ -58,9 +60,9 @@ def ego_body() -> Mesh:
 
 
 def walker(colours: Array, face: int, head_turn: float, height: float) -> Mesh:
-    """Trunk, arms and head of a walker ``height`` m tall with face ``face``, looking ``head_turn`` rad left.
+    """Trunk and head of a walker ``height`` m tall with face ``face``, looking ``head_turn`` rad left.
 
-    colours : (2, 3) albedo of shirt and trousers. Legs are parts of their own, see `leg`.
+    colours : (2, 3) albedo of shirt and trousers. Limbs are bodies of their own, see `leg` and `arm`.
     """
     k = height / 1.75
     head = join(
@@ -72,15 +74,23 @@ def walker(colours: Array, face: int, head_turn: float, height: float) -> Mesh:
     c, s = np.cos(head_turn / 2), np.sin(head_turn / 2)
     parts = [
         ellipsoid((0, 0, 1.17), (0.20, 0.13, 0.34), Surface.CLOTH, colours[0]),
+        ellipsoid((0, 0, 0.93), (0.17, 0.12, 0.14), Surface.CLOTH, colours[1]),
+        cylinder((-0.19, 0, 1.42), (0.19, 0, 1.42), (0.065, 0.065), Surface.CLOTH, colours[0]),
         cylinder((0, 0, 1.42), (0, 0, 1.53), (0.06, 0.06), Surface.SKIN),
         head.moved(transform((0, 0, EYE_HEIGHT_M), (c, 0, 0, s))),
     ]
-    for side in (-1, 1):
-        parts.append(
-            cylinder(
-                (0.21 * side, 0, 1.40), (0.27 * side, 0.08, 0.85), (0.06, 0.045), Surface.CLOTH, colours[0]
-            )
-        )
+    return join(parts).moved(np.diag([k, k, k, 1.0]))
+
+
+def arm(colour: ArrayLike, height: float, side: float) -> Mesh:
+    """One arm, origin at the shoulder, hanging down; on the right for ``side`` 1, left for -1."""
+    k = height / 1.75
+    elbow, wrist = (0.03 * side, -0.01, -0.29), (0.04 * side, 0.06, -0.54)
+    parts = [
+        cylinder((0, 0, 0.03), elbow, (0.06, 0.05), Surface.CLOTH, colour),
+        cylinder(elbow, wrist, (0.05, 0.04), Surface.CLOTH, colour),
+        ellipsoid((0.04 * side, 0.08, -0.60), (0.03, 0.045, 0.08), Surface.SKIN),
+    ]
     return join(parts).moved(np.diag([k, k, k, 1.0]))
 
 

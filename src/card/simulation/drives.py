@@ -31,6 +31,7 @@ class Drive:
     house_depth, tree_spacing : metres; 0 for none.
     crossing_s : when walkers cross before the car, s after the cameras start; None for never.
     walker_spacing : metres between walkers along the road.  oncoming_s, parked_spacing : s, m between cars.
+    leader, follower : a car ahead of us in our lane, one behind us.
     night : dark, with street lamps and headlights.
     lasts_s : no scale's recording is longer.
     bag : delivered as a rosbag2 with packets.
@@ -56,6 +57,7 @@ class Drive:
     oncoming_s: float = 0.0
     parked_spacing: float = 0.0
     leader: bool = False
+    follower: bool = False
     night: bool = False
     lasts_s: float = math.inf
     bag: bool = False
@@ -96,6 +98,7 @@ DRIVES = {
         walker_spacing=16.0,
         oncoming_s=5.0,
         parked_spacing=24.0,
+        follower=True,
     ),
     "de_rural_potholes": Drive(
         session="2026-04-14-mid",
@@ -125,6 +128,8 @@ DRIVES = {
         pothole_spacing=15.0,
         tree_spacing=6.0,
         walker_spacing=55.0,
+        leader=True,
+        follower=True,
         bag=True,
     ),
     "it_town_revisit": Drive(
@@ -167,6 +172,7 @@ DRIVES = {
         oncoming_s=6.0,
         parked_spacing=20.0,
         leader=True,
+        follower=True,
         night=True,
     ),
 }
@@ -194,6 +200,7 @@ FURTHER_DRIVES = {
         oncoming_s=6.0,
         parked_spacing=22.0,
         leader=True,
+        follower=True,
         lasts_s=72.0,
     ),
     # Walking pace: a stop of five seconds, walkers along the car.
@@ -216,7 +223,7 @@ FURTHER_DRIVES = {
         walker_spacing=6.0,
         oncoming_s=7.0,
         parked_spacing=18.0,
-        leader=True,
+        follower=True,
     ),
 }
 

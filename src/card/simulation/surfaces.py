@@ -71,5 +71,5 @@ LOOKS = {
     Surface.BOARD: Look((1.0, 1.0, 1.0), 0.0, 0.0, 0.60),
     Surface.LAMP: Look((0.8, 0.8, 0.8), 0.0, 0.0, 0.60, emission=6.0),
     Surface.PATCH: Look((0.075, 0.075, 0.08), 0.40, 0.15, 0.10),
-    Surface.MANHOLE: Look((0.16, 0.14, 0.125), 0.70, 0.20, 0.35),
+    Surface.MANHOLE: Look((0.11, 0.11, 0.115), 0.70, 0.20, 0.35),
 }

@@ -1,29 +1,45 @@
 """Who else is on the road: walkers and cars, and the ways they go."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from card.geometry import Trajectory, quaternion_from_matrix, transform
-from card.simulation.bodies import car, leg, walker
+from card.simulation.bodies import (
+    CAR_LENGTH_M,
+    CAR_WHEELBASE_M,
+    HIP_M,
+    SHOULDER_M,
+    arm,
+    car,
+    leg,
+    walker,
+)
+from card.simulation.car_following import Barrier, flow
 from card.simulation.drives import Drive
 from card.simulation.faces_and_plates import face_texture, plate_texture
 from card.simulation.mesh import Mesh
 from card.simulation.raycast import Mover
 from card.simulation.road import Road
 from card.simulation.vehicle import Course
+from card.simulation.walking import ARM_SWING, LEG_SWING, Way, aside, crossing, strolling, swing
 
 Array = NDArray[np.float64]
 
 _PATH_HZ = 25
-_WALK_M_S = 1.3
-_STRIDE_HZ = 0.9
-_HIP_M = (0.10, 0.92)
 _COLOURS = np.array(
     [(0.5, 0.5, 0.52), (0.03, 0.03, 0.035), (0.45, 0.05, 0.05), (0.05, 0.1, 0.35), (0.7, 0.7, 0.68)]
 )
+#: From our rig's origin to our rear bumper.
+_OWN_REAR_M = 2.95
+#: How far beyond the kerb cars park (their middle), and walkers walk: by direction, past cars, and to cross.
+_PARKED_M, _TOWARDS_M, _AWAY_M, _BESIDE_PARKED_M, _CROSSED_M = 0.6, 0.9, 1.45, 1.85, 1.8
+_MOST_WALKERS = 40
+#: Nobody parks inside a sharper bend, 1/m: the corners would block the sidewalk.
+_SHARPEST_PARKING = 1 / 30
+#: What is beyond an open road's ends waits below the ground.
+_OUT_OF_SIGHT_M = 30.0
 
 
 @dataclass(frozen=True)
@@ -38,8 +54,9 @@ class Thing:
 class Traffic:
     """Builds movers and parked cars while it keeps the list of things that carry labels.
 
+    taken : (s, d) of lamps and trees, where nobody parks.
     things : grows with each face and plate.  movers, parked : what was built.
-    cars : indices of the movers that are cars, their lamps on.
+    cars, walkers : indices of the movers that are cars, their lamps on, and of walkers' trunks.
     """
 
     drive: Drive
@@ -47,123 +64,165 @@ class Traffic:
     course: Course
     start_ns: int
     rng: np.random.Generator
+    taken: list[tuple[float, float]]
     things: list[Thing]
     movers: list[Mover] = field(default_factory=list)
     parked: list[Mesh] = field(default_factory=list)
     cars: list[int] = field(default_factory=list)
+    walkers: list[int] = field(default_factory=list)
+    _parked_at: list[tuple[float, float]] = field(default_factory=list)
+    _barrier: Barrier | None = None
+    _kept_clear: float | None = None
+
+    def __post_init__(self) -> None:
+        self._time = np.arange(self.course.t[0], self.course.t[-1] + 1 / _PATH_HZ, 1 / _PATH_HZ)
 
     def populate(self, camera_start_s: float, duration_s: float) -> None:
         """Put everyone on the road of a drive of ``duration_s`` with cameras from ``camera_start_s``."""
         drive, begin = self.drive, camera_start_s
-        edge = drive.section.half_width
         if drive.crossing_s is not None:
-            stops = any(speed == 0 for _, speed in drive.speeds)
-            # A car that does not stop must find them gone when it gets there.
-            ahead, early = (3.5, 0.0) if stops else (13.0, 1.4)
-            look = begin + drive.crossing_s
-            for index, late in enumerate((-1.0, 0.4, 1.6)):
-                where = self.course.at(look) + ahead + 0.6 * index
-                self.cross(where, look + late - early, -1 if index == 1 else 1)
-        if drive.walker_spacing:
-            first = self.course.at(begin + 1.0) + 5.5
-            for k in range(-2, 12):
-                side = 1 if k % 3 else -1
-                t = self._when(first + k * drive.walker_spacing, duration_s)
-                self.stroll(first + k * drive.walker_spacing, side * (edge + 0.9), t, towards=k % 4 != 3)
-        if drive.oncoming_s:
-            for t in np.arange(begin % drive.oncoming_s + 1.5, duration_s + 6, drive.oncoming_s):
-                self.oncoming(float(t))
-        if drive.leader:
-            self.follow(2.4)
-            self.follow(-2.2)
+            self._cross_all(begin + drive.crossing_s)
         if drive.parked_spacing:
             span = self.course.at(duration_s) - self.course.at(0)
-            for s in np.arange(4.0, min(span + 60, 700), drive.parked_spacing):
+            longest = self.road.line.length - drive.parked_spacing if self.road.line.closed else np.inf
+            for s in np.arange(4.0, min(span + 60, 700, longest), drive.parked_spacing):
                 self.park(self.course.at(0) + s + self.rng.uniform(-3, 3))
+        if drive.walker_spacing:
+            first = self.course.at(begin + 1.0) + 5.5
+            count = int((self.course.at(duration_s) - first) / drive.walker_spacing) + 2
+            for k in range(-2, min(max(count, 12), _MOST_WALKERS)):
+                s = first + k * drive.walker_spacing
+                self.stroll(s, 1.0 if k % 3 else -1.0, self._when(s, duration_s), towards=k % 4 != 3)
+        if drive.oncoming_s:
+            self.oncoming(begin % drive.oncoming_s + 1.5, duration_s)
+        if drive.leader:
+            self.lead(4.0)
+        if drive.follower:
+            self.follow()
 
     def cross(self, s: float, t: float, direction: int) -> None:
         """A walker crossing at ``s`` to the right (1) or left (-1), before the car at ``t`` (s)."""
-        lane = self.drive.section.lane
-
-        def way(time: Array) -> tuple[Array, Array, Array]:
-            d = lane + direction * _WALK_M_S * (time - t)
-            return np.full_like(time, s), d, np.full_like(time, -direction * np.pi / 2)
-
+        section = self.drive.section
+        side, along = section.half_width + _CROSSED_M, 1 if self.rng.random() < 0.5 else -1
+        way = crossing(self._time, s, section.lane, side, t, direction, along)
         self._walk(way, head_turn=-direction * np.radians(80))
 
-    def stroll(self, s: float, d: float, t: float, *, towards: bool) -> None:
-        """A walker along the road, at (s, d) at time ``t`` (s), walking towards the car or away."""
-        sign = -1.0 if towards else 1.0
-
-        def way(time: Array) -> tuple[Array, Array, Array]:
-            turn = np.pi if towards else 0.0
-            return s + sign * _WALK_M_S * (time - t), np.full_like(time, d), np.full_like(time, turn)
-
-        self._walk(way, head_turn=np.sign(d) * -np.radians(12) * (1 if towards else 0))
-
-    def oncoming(self, t: float) -> None:
-        """A car in the other lane that meets ours at time ``t`` (s)."""
-        speed, meet = self.rng.uniform(6, 9), self.course.at(t)
-        lane = -max(self.drive.section.lane, 1.1)
-        self._drive_along(
-            lambda time: (meet - speed * (time - t), np.full_like(time, lane), np.pi + 0 * time)
+    def stroll(self, s: float, side: float, t: float, *, towards: bool) -> None:
+        """A walker beside the road, at ``s`` at time ``t`` (s), walking towards the car or away."""
+        edge = self.drive.section.half_width
+        usual, far = edge + (_TOWARDS_M if towards else _AWAY_M), edge + _BESIDE_PARKED_M
+        cars = [at for at, d in self._parked_at if d * side > 0]
+        if self.road.line.closed:
+            cars = [at + turn * self.road.line.length for at in cars for turn in (-1, 0, 1)]
+        way = strolling(
+            self._time, s, t, towards, lambda at: side * aside(at, cars, CAR_LENGTH_M / 2, usual, far)
         )
+        self._walk(way, head_turn=-side * np.radians(12) * (1 if towards else 0))
 
-    def follow(self, headway_s: float) -> None:
-        """A car in our lane, ``headway_s`` ahead of us (behind if negative), at our own speeds."""
-        lane, course = self.drive.section.lane, self.course
-        gap = 6.0 * np.sign(headway_s)
-        last = course.t[-1]
+    def oncoming(self, first_s: float, duration_s: float) -> None:
+        """Cars in the other lane, the first one met at ``first_s``, and further ones every so often."""
+        speed, line = self.rng.uniform(6.5, 9), self.road.line
+        meetings = np.arange(first_s, duration_s + 6, self.drive.oncoming_s)
+        met = np.array([self.course.at(float(t)) for t in meetings])
+        start, ring = -(met + speed * (meetings - self._time[0])), None
+        if line.closed:
+            own = float(np.ptp(self.course.s)) / float(np.ptp(self.course.t))
+            count = max(1, round(line.length / ((own + speed) * self.drive.oncoming_s)))
+            start, ring = start[0] - line.length / count * np.arange(count), line.length
+        place = flow(
+            self._time, start, speed, speed, CAR_LENGTH_M, ring=ring, barrier=self._barrier
+        )  # it counts their way, against ours
+        lane = -max(self.drive.section.lane, 1.1)
+        for column in place.T:
+            self._drive(-column, lane, backwards=True)
 
-        def way(time: Array) -> tuple[Array, Array, Array]:
-            s = np.interp(time + headway_s, course.t, course.s) + gap
-            beyond = np.maximum(time + headway_s - last, 0) * 6.0
-            before = np.minimum(time + headway_s - course.t[0], 0) * 6.0
-            return s + beyond + before, np.full_like(time, lane), 0 * time
+    def lead(self, headway_s: float) -> None:
+        """A car in our lane ``headway_s`` ahead of us, at our own speeds."""
+        course, time = self.course, self._time + headway_s
+        beyond = np.maximum(time - course.t[-1], 0) * 6.0
+        self._drive(np.interp(time, course.t, course.s) + beyond + 6.0, self.drive.section.lane)
 
-        self._drive_along(way)
+    def follow(self) -> None:
+        """A car behind us that keeps its distance."""
+        rear = np.interp(self._time, self.course.t, self.course.s) - _OWN_REAR_M
+        speed = float(rear[1] - rear[0]) * _PATH_HZ
+        start = np.array([rear[0] - CAR_LENGTH_M / 2 - 4.0 - 1.2 * speed])
+        place = flow(self._time, start, speed, 14.0, CAR_LENGTH_M, ahead=rear)
+        self._drive(place[:, 0], self.drive.section.lane)
 
     def park(self, s: float) -> None:
         """A parked car, half on the sidewalk, on the left more often than on the right."""
         side = -1.0 if self.rng.random() < 0.75 else 1.0
-        pose = self.road.pose(s, side * (self.drive.section.half_width + 0.75), 0.0 if side > 0 else np.pi)
+        d = side * (self.drive.section.half_width + _PARKED_M)
+        lamps = any(self._apart(s, at) < CAR_LENGTH_M / 2 + 0.5 and d * where > 0 for at, where in self.taken)
+        sharp = -side * float(self.road.line.curvature(s)) > _SHARPEST_PARKING
+        if lamps or sharp or (self._kept_clear is not None and self._apart(s, self._kept_clear) < 6.0):
+            return
+        self._parked_at.append((s, d))
+        pose = self.road.pose(s, d, 0.0 if side > 0 else np.pi)
         self.parked.append(self._car(lit=False).moved(pose))
 
-    def _drive_along(self, way: Callable[[Array], tuple[Array, Array, Array]]) -> None:
-        self.cars.append(len(self.movers))
-        self.movers.append(Mover(self._car(lit=True), self._path(way)))
+    def _cross_all(self, look: float) -> None:
+        """Three walkers before the car at ``look`` (s), the middle one the other way; oncoming cars wait."""
+        stops = any(speed == 0 for _, speed in self.drive.speeds)
+        # A car that does not stop must find them gone when it gets there.
+        ahead, early = (3.5, 0.0) if stops else (13.0, 0.5)
+        times = [look + late - early for late in (-1.0, 0.3, 1.0)]
+        for index, t in enumerate(times):
+            self.cross(self.course.at(look) + ahead + 0.6 * index, t, -1 if index == 1 else 1)
+        self._kept_clear = self.course.at(look) + ahead + 0.6
+        self._barrier = Barrier(-(self._kept_clear + 2.5), times[0] - 7.0, times[-1] + 4.0)
 
-    def _walk(self, way: Callable[[Array], tuple[Array, Array, Array]], head_turn: float) -> None:
-        colours = _COLOURS[self.rng.integers(0, len(_COLOURS), 2)] * self.rng.uniform(0.7, 1.2, (2, 1))
-        height = self.rng.uniform(1.62, 1.85)
-        self.things.append(Thing("face", face_texture(len(self.things))))
-        face = len(self.things) - 1
-        self.movers.append(Mover(walker(colours, face, head_turn, height), self._path(way)))
-        phase = self.rng.uniform(0, 2 * np.pi)
-        for side in (-1.0, 1.0):
-            path = self._path(
-                way, hip=(side * _HIP_M[0], _HIP_M[1] * height / 1.75), phase=phase + side * np.pi / 2
-            )
-            self.movers.append(Mover(leg(colours[1], height), path))
+    def _apart(self, s: float, other: float) -> float:
+        gap = abs(s - other)
+        if self.road.line.closed:
+            gap %= self.road.line.length
+            gap = min(gap, self.road.line.length - gap)
+        return gap
 
-    def _path(
-        self,
-        way: Callable[[Array], tuple[Array, Array, Array]],
-        hip: tuple[float, float] | None = None,
-        phase: float = 0.0,
-    ) -> Trajectory:
-        t = np.arange(self.course.t[0], self.course.t[-1] + 1 / _PATH_HZ, 1 / _PATH_HZ)
-        s, d, turn = way(t)
+    def _drive(self, s: Array, d: float, *, backwards: bool = False) -> None:
+        """A car over arc lengths (N,), both axles on the road."""
+        sign = -1.0 if backwards else 1.0
+        reach = sign * CAR_WHEELBASE_M / 2
+        offset = np.full_like(s, d)
+        pose = self._pose(s, offset, np.full_like(s, np.pi if backwards else 0.0))
         if not self.road.line.closed:
-            # Beyond the road's ends, movers wait out of sight.
-            s = np.clip(s, self.road.line.start + 3, self.road.line.start + self.road.line.length - 3)
-        pose = self.road.pose(s, d, turn)
-        if hip is not None:
-            swing = 0.45 * np.sin(2 * np.pi * _STRIDE_HZ * t + phase)
-            zero = np.zeros_like(t)
-            quaternion = np.stack([np.cos(swing / 2), np.sin(swing / 2), zero, zero], axis=-1)
-            pose = pose @ transform((hip[0], 0.0, hip[1]), quaternion)
-        t_ns = self.start_ns + np.round(t * 1e9).astype(np.int64)
+            s = np.clip(s, self.road.line.start + 5, self.road.line.start + self.road.line.length - 5)
+        front, rear = (self.road.xyz(s + along, offset)[:, 2] for along in (reach, -reach))
+        pose[:, 2, 3] += (front + rear) / 2 - self.road.xyz(s, offset)[:, 2]
+        pose = pose @ _about_x(np.arctan2(front - rear, CAR_WHEELBASE_M))
+        self.cars.append(len(self.movers))
+        self.movers.append(Mover(self._car(lit=True), self._path(pose)))
+
+    def _walk(self, way: Way, head_turn: float) -> None:
+        colours = _COLOURS[self.rng.integers(0, len(_COLOURS), 2)] * self.rng.uniform(0.7, 1.2, (2, 1))
+        height, phase = self.rng.uniform(1.62, 1.85), self.rng.uniform(0, 2 * np.pi)
+        self.things.append(Thing("face", face_texture(len(self.things))))
+        trunk = self._pose(way.s, way.d, way.turn)
+        self.walkers.append(len(self.movers))
+        self.movers.append(Mover(walker(colours, len(self.things) - 1, head_turn, height), self._path(trunk)))
+        for side in (-1.0, 1.0):
+            # An arm swings with the other side's leg.
+            for limb, joint, widest, turn in (
+                (leg(colours[1], height), HIP_M, LEG_SWING, side),
+                (arm(colours[0], height, side), SHOULDER_M, ARM_SWING, -side),
+            ):
+                angle = swing(way, 1 / _PATH_HZ, widest, phase + turn * np.pi / 2)
+                hung = transform(np.array([side * joint[0], 0.0, joint[1]]) * height / 1.75)
+                self.movers.append(Mover(limb, self._path(trunk @ hung @ _about_x(angle))))
+
+    def _pose(self, s: Array, d: Array, turn: Array) -> Array:
+        """``world_from_body`` (N, 4, 4) on the road; what is beyond its ends waits out of sight."""
+        line = self.road.line
+        if line.closed:
+            return self.road.pose(s, d, turn)
+        kept = np.clip(s, line.start + 5, line.start + line.length - 5)
+        pose = self.road.pose(kept, d, turn)
+        pose[:, 2, 3] -= np.where(kept == s, 0.0, _OUT_OF_SIGHT_M)
+        return pose
+
+    def _path(self, pose: Array) -> Trajectory:
+        t_ns = self.start_ns + np.round(self._time * 1e9).astype(np.int64)
         return Trajectory(t_ns, pose[:, :3, 3], quaternion_from_matrix(pose[:, :3, :3]))
 
     def _car(self, *, lit: bool) -> Mesh:
@@ -175,3 +234,10 @@ class Traffic:
     def _when(self, s: float, duration_s: float) -> float:
         """When the car is about 5 m before arc length ``s``."""
         return float(np.clip(np.interp(s - 5.0, self.course.s, self.course.t), 0, duration_s))
+
+
+def _about_x(angle: Array) -> Array:
+    """Turns (N, 4, 4) of a body to its front by ``angle`` (N,) rad: its y rises."""
+    zero = np.zeros_like(angle)
+    quaternion = np.stack([np.cos(angle / 2), np.sin(angle / 2), zero, zero], axis=-1)
+    return transform(np.zeros((len(angle), 3)), quaternion)

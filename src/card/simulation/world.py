@@ -37,6 +37,7 @@ class World:
     sun : (3,) unit vector towards it, or at night towards the moon.
     lamps : (L, 3) where street lamps shine from; they are on at night.
     cars : indices of the movers that are cars, their headlights on (`bodies.HEADLIGHTS_M`).
+    walkers : indices of the movers that are walkers' trunks, each followed by its four limbs.
     """
 
     name: str
@@ -54,6 +55,7 @@ class World:
     sun: Array
     lamps: Array
     cars: tuple[int, ...]
+    walkers: tuple[int, ...]
 
     def rng(self, purpose: str) -> np.random.Generator:
         """A random stream of its own for each purpose."""
@@ -89,9 +91,9 @@ def world_of(name: str, drive: Drive, size: Scale, seed: int) -> World:
     road = road.placed(world_from_map)
     path = Trajectory(path.t_ns, *_parts(world_from_map @ path.at(path.t_ns)))
 
-    standing, lamps = _scenery(drive, road, _rng(seed, name, "scenery"))
+    standing, lamps, taken = _scenery(drive, road, _rng(seed, name, "scenery"))
     things = [Thing(thing.kind) for thing in road.irregularities]
-    traffic = Traffic(drive, road, where, start_ns, _rng(seed, name, "traffic"), things)
+    traffic = Traffic(drive, road, where, start_ns, _rng(seed, name, "traffic"), taken, things)
     traffic.populate(begin, size.duration_s)
     static = join([*_ground(road, where), *standing, *traffic.parked])
     light = _rng(seed, name, "light")
@@ -116,6 +118,7 @@ def world_of(name: str, drive: Drive, size: Scale, seed: int) -> World:
         sun,
         np.array(lamps).reshape(-1, 3),
         tuple(traffic.cars),
+        tuple(traffic.walkers),
     )
 
 
@@ -136,19 +139,27 @@ def _ground(road: Road, where: Course) -> list[Mesh]:
     return [road_mesh(road, fine, whole), land_mesh(road, road.xyz(s, 0 * s)[:, :2])]
 
 
-def _scenery(drive: Drive, road: Road, rng: np.random.Generator) -> tuple[list[Mesh], list[Array]]:
-    """Meshes of what stands beside the road, and where its lamps are."""
+def _scenery(
+    drive: Drive, road: Road, rng: np.random.Generator
+) -> tuple[list[Mesh], list[Array], list[scenery.Place]]:
+    """Meshes of what stands beside the road, where its lamps shine from, and what stands at the kerb."""
     span = (road.line.start + 2, road.line.start + road.line.length - 2)
     found: list[Mesh] = []
     lamps: list[Array] = []
+    taken: list[scenery.Place] = []
     if drive.house_depth:
         found += scenery.houses(road, span, drive.house_depth, rng)
     if drive.section.kerb:
-        masts, lamps = scenery.poles(road, span, rng)
+        taken += scenery.pole_places(road, span, rng)
+        masts, lamps = scenery.poles(road, taken)
         found += masts
     if drive.tree_spacing:
-        found += scenery.trees(road, span, drive.tree_spacing, rng)
-    return found, lamps
+        street = bool(drive.house_depth)
+        places = scenery.tree_places(road, span, drive.tree_spacing, rng, street=street)
+        places = [p for p in places if all(np.hypot(p[0] - q[0], p[1] - q[1]) > 2.5 for q in taken)]
+        found += scenery.trees(road, places, rng, street=street)
+        taken += places
+    return found, lamps, taken
 
 
 def _level(rig_from_map: Array) -> Array:
