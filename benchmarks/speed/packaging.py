@@ -25,7 +25,8 @@ def rows(scratch: Path, repeats: int) -> list[dict[str, Any]]:
     def pack() -> None:
         shutil.rmtree(packed, ignore_errors=True)
         packed.mkdir()
-        write_shards((Source(path.name, path) for path in raw.iterdir()), packed, "raw", SHARD_BYTES)
+        sources = (Source(path.name, int(path.stem), path) for path in raw.iterdir())
+        write_shards(sources, packed, "raw", max_bytes=SHARD_BYTES, numbers=FILES)
 
     def baseline() -> None:
         command = f"tar -cf - -C '{raw}' . | sha256sum"

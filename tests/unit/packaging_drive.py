@@ -92,7 +92,7 @@ def write_drive(work: Path, row: dict[str, Any], seed: int = 0) -> dict[str, Any
         },
         "out": results / "package",
         "report": results / "package.report.json",
-        "settings": {name: SETTINGS[name] for name in ("shard_max_bytes", "classes")},
+        "settings": {name: SETTINGS[name] for name in ("shard_max_bytes", "shard_frames", "classes")},
         "gates": [],
     }
 
@@ -142,7 +142,13 @@ def build_tree(work: Path, name: str = "de_test", splits: list[str] | None = Non
 
 
 def assemble_tree(
-    work: Path, sequences: list[dict[str, Any]], spdx: str = "CC-BY-4.0", terms: Any = None
+    work: Path,
+    sequences: list[dict[str, Any]],
+    spdx: str = "CC-BY-4.0",
+    terms: Any = None,
+    takedowns: Any = (),
+    previous: Path | None = None,
+    version: str = "0.1.0",
 ) -> Path:
     """Assemble packages into a tree with the repository's own templates."""
     terms = terms or LICENSES["licenses"][spdx]
@@ -155,9 +161,11 @@ def assemble_tree(
         release_folder=ROOT / "release",
         schemas=schema_folder(),
         split_report=None,
+        takedowns=takedowns,
+        previous=previous,
         out=out,
         report=out.with_name(f"{out.name}.report.json"),
-        settings=SETTINGS,
+        settings=SETTINGS | {"release": SETTINGS["release"] | {"version": version}},
         gates=[],
     )
     return out

@@ -9,6 +9,8 @@ from card.artifacts.schemas import check, load_schema, schema_folder, with_defau
 from card.errors import CardError
 from card.packaging.licenses import license_of, read_licenses
 from card.packaging.summary import summarize
+from card.packaging.takedowns import read_takedowns, whole_sequences
+from card.packaging.versions import latest_record
 from card.recording.description import check_identity
 from card.recording.fingerprint import fingerprint
 from card.recording.sheet import read_sequences
@@ -29,11 +31,13 @@ PROTOCOL = [name for name in SETTINGS["benchmark"] if name not in ("methods", "s
 
 
 def load_plan():
-    """The checked configuration: licences, gates, splits ledger and the sequences to build, by id."""
+    """The checked configuration: licences, gates, splits ledger, takedowns, all rows, those to build by id."""
     check(SETTINGS, "config", "config/config.yaml")
     licenses = read_licenses(Path(SETTINGS["licenses"]))
     gates = read_yaml(Path(SETTINGS["gates"]), "gates")
     rows = read_sequences(Path(SETTINGS["sheet"]), licenses["countries"])
+    takedowns = read_takedowns(Path(SETTINGS["takedowns"]), [row.id for row in rows])
+    withdrawn = whole_sequences(takedowns)
     unknown = sorted(set(SUBSET) - {row.id for row in rows})
     if unknown:
         raise CardError(
@@ -42,7 +46,9 @@ def load_plan():
     chosen = {
         row.id: row
         for row in rows
-        if not row.quarantine and (not SUBSET or row.id in SUBSET)
+        if not row.quarantine
+        and row.id not in withdrawn
+        and (not SUBSET or row.id in SUBSET)
     }
     for row in chosen.values():
         check_raw_input(row)
@@ -51,7 +57,7 @@ def load_plan():
         dict(zip(COLUMNS, line.cells()))
         for line in read_ledger(Path(SETTINGS["splits_ledger"]))
     ]
-    return licenses, gates, ledger, chosen
+    return licenses, gates, ledger, takedowns, rows, chosen
 
 
 def check_records():
@@ -99,7 +105,7 @@ def check_raw_input(row):
 
 try:
     check_records()
-    LICENSES, GATES, LEDGER, SEQUENCES = load_plan()
+    LICENSES, GATES, LEDGER, TAKEDOWNS, ROWS, SEQUENCES = load_plan()
 except CardError as error:
     raise WorkflowError(f"card: {error}") from None
 

@@ -29,7 +29,7 @@ rule package:
     log:
         "logs/{id}/package.log",
     params:
-        cfg=cfg("packaging", "shard_max_bytes", "classes"),
+        cfg=cfg("packaging", "shard_max_bytes", "shard_frames", "classes"),
         code=code("package"),
         row=row(
             "id",
@@ -44,6 +44,7 @@ rule package:
         ),
         spdx=lambda wildcards: license_of(SEQUENCES[wildcards.id].country, LICENSES),
         raw=raw_parts,
+        takedowns=takedowns_of,
         out=subpath(output.inventory, parent=True),
     script:
         "../scripts/package.py"
@@ -55,6 +56,7 @@ rule assemble:
         splits=tree_splits,
         split_report=rules.split_report.output.report,
         schemas=sorted(os.path.relpath(path) for path in schema_folder().glob("*.json")),
+        previous=last_release,
         changelog=str(TEMPLATES / "CHANGELOG.md"),
         templates=sorted(str(path) for path in TEMPLATES.rglob("*") if path.is_file()),
     output:
@@ -71,6 +73,7 @@ rule assemble:
         sequences=lambda wildcards: [
             sequence.id for sequence in in_tree(wildcards.repository)
         ],
+        takedowns=tree_takedowns,
         out=subpath(output.sums, parent=True),
     script:
         "../scripts/assemble.py"

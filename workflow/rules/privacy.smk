@@ -1,5 +1,5 @@
 # Needs: the raw images of both cameras and, for the recall gate, what a person labelled in some of them.
-# Makes: results/{id}/anonymized/, the only place later rules take images from.
+# Makes: results/{id}/anonymized/ and results/{id}/regions/, the only places later rules take images from.
 
 
 rule privacy:
@@ -22,3 +22,21 @@ rule privacy:
         out=subpath(output.images, parent=True),
     script:
         "../scripts/privacy.py"
+
+
+rule regions:
+    # Only for sequences with takedowns of image regions.
+    input:
+        anonymized=rules.privacy.output.inventory,
+        frames=rules.ingest.output.frames,
+    output:
+        inventory="results/{id}/regions/inventory.parquet",
+        report="results/{id}/regions.report.json",
+    log:
+        "logs/{id}/regions.log",
+    params:
+        cfg=takedowns_of,
+        code=code("regions"),
+        out=subpath(output.inventory, parent=True),
+    script:
+        "../scripts/regions.py"

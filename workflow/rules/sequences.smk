@@ -129,6 +129,36 @@ def ledger_rows(names):
     return [line for line in LEDGER if line["sequence"] in names]
 
 
+def takedowns_of(wildcards):
+    """Takedowns within the sequence; one that went whole is not planned at all."""
+    return [entry for entry in TAKEDOWNS if entry["sequence"] == wildcards.id]
+
+
+def has_regions(name):
+    return any(entry["region"] for entry in TAKEDOWNS if entry["sequence"] == name)
+
+
+def tree_takedowns(wildcards):
+    """Takedowns of sequences that are, or were, in a tree; a subset knows of its own only."""
+    spdx = REPOSITORIES[wildcards.repository]
+    names = {
+        row.id
+        for row in ROWS
+        if license_of(row.country, LICENSES) == spdx
+        and (not SUBSET or row.id in SUBSET)
+    }
+    return [entry for entry in TAKEDOWNS if entry["sequence"] in names]
+
+
+def last_release(wildcards):
+    """Files of the record of the last release of a repository; none before the first, nor for a subset."""
+    version = SETTINGS["packaging"]["release"]["version"]
+    record = latest_record(Path(SETTINGS["records"]), wildcards.repository, version)
+    if SUBSET or record is None:
+        return []
+    return sorted(str(path) for path in record.rglob("*") if path.is_file())
+
+
 def stages_of(sequence):
     """The stages whose modalities a sequence has."""
     planned = {
@@ -155,6 +185,8 @@ def package_inputs(wildcards):
     for name, (stage, output) in PACKED.items():
         if stage in stages:
             found[name] = getattr(getattr(rules, stage).output, output)
+    if has_regions(wildcards.id):
+        found["regions"] = rules.regions.output.inventory
     return found
 
 

@@ -6,6 +6,7 @@ from card.artifacts import logged
 from card.artifacts.schemas import schema_folder
 from card.packaging.assemble import assemble
 
+previous = [Path(path) for path in snakemake.input.previous]
 splits = {Path(path).parent.name: Path(path) for path in snakemake.input.splits}
 
 with logged(Path(snakemake.log[0])):
@@ -20,8 +21,9 @@ with logged(Path(snakemake.log[0])):
         release_folder=Path(snakemake.input.changelog).parent,
         schemas=schema_folder(),
         split_report=Path(snakemake.input.split_report),
+        takedowns=snakemake.params.takedowns,
+        previous=next((path.parent for path in previous if path.name == "release.json"), None),
         out=Path(snakemake.params.out),
         report=Path(snakemake.output.report),
-        settings=snakemake.params.cfg["settings"],
-        gates=snakemake.params.cfg["gates"],
+        **snakemake.params.cfg,
     )

@@ -10,7 +10,7 @@ reports = {
     name.removesuffix("_report"): inputs.pop(name) for name in list(inputs) if name.endswith("_report")
 }
 # A folder is tracked by the inventory inside.
-inputs |= {name: inputs[name].parent for name in ("ground_truth", "anonymized") if name in inputs}
+inputs |= {name: inputs[name].parent for name in ("ground_truth", "anonymized", "regions") if name in inputs}
 
 with logged(Path(snakemake.log[0])):
     pack_sequence(
@@ -19,6 +19,7 @@ with logged(Path(snakemake.log[0])):
         reports=reports,
         out=Path(snakemake.params.out),
         report=Path(snakemake.output.report),
+        takedowns=snakemake.params.takedowns,
         settings=snakemake.params.cfg["settings"],
         gates=snakemake.params.cfg["gates"],
         **inputs,

@@ -22,9 +22,13 @@ from card.packaging.metadata import write_metadata
 from card.packaging.mini import mini_columns
 from card.packaging.pages import write_pages
 from card.packaging.reader import SPLITS, Release
+from card.packaging.retractions import retraction_rows
+from card.packaging.takedowns import whole_tombstones
+from card.packaging.versions import changes, check_version, read_records
 
 SHIPPED_SCHEMAS = (
     "calibration",
+    "changes",
     "ground_truth_points",
     "imu",
     "poses",
@@ -50,6 +54,8 @@ def assemble(
     release_folder: Path,
     schemas: Path,
     split_report: Path | None,
+    takedowns: Sequence[Mapping[str, Any]],
+    previous: Path | None,
     out: Path,
     report: Path,
     settings: Mapping[str, Any],
@@ -64,7 +70,11 @@ def assemble(
     release_folder : templates and licence texts; schemas : folder of the schemas that ship with the tree.
     split_report : report of the splits' leakage and balance, None without.
 
-    CardError when anything in a package is under another licence than the tree.
+    takedowns : entries of `read_takedowns` about sequences of this tree.
+    previous : record of the last release of this repository (`versions.RECORDED`), None before the first.
+
+    CardError when anything in a package is under another licence than the tree, something retracted is
+    there, a released frame moved to another split, or the version does not tell what changed.
     """
     ordered = sorted(sequences, key=lambda item: item["id"])
     with atomic_folder(out) as tree:
@@ -73,7 +83,20 @@ def assemble(
             _check_license(item["id"], Path(item["package"]), spdx)
             hashes |= _place(item["id"], Path(item["package"]), tree)
         rows = [read_json(Path(item["package"]) / "sequence.json", "release_sequence") for item in ordered]
-        frames = write_metadata(tree, ordered, rows)
+        before = read_records(previous) if previous else None
+        stones = [
+            row
+            for item in ordered
+            for row in read_table(
+                Path(item["package"]) / "retractions.parquet", "package_retractions"
+            ).to_pylist()
+        ]
+        retracted = retraction_rows(
+            [*stones, *whole_tombstones(takedowns)],
+            before.retractions if before else [],
+            settings["release"]["version"],
+        )
+        frames = write_metadata(tree, ordered, rows, retracted)
         mini = mini_columns(Release(tree), frames, settings["mini_frames"], settings["mini_side_px"])
         write_table(tree / "mini" / "mini.parquet", mini, "release_mini")
         (tree / "schemas").mkdir()
@@ -105,12 +128,16 @@ def assemble(
             has_mini=bool(mini["frame"]),
         )
         hashes |= _hash_rest(tree, hashes)
+        _write_sums(tree, hashes)
+        difference = changes(before, read_records(tree))
+        check_version(difference)
+        write_json(tree / "changes.json", difference, "changes")
+        hashes["changes.json"] = sha256_file(tree / "changes.json")
         write_json(
             tree / "croissant.json", croissant(document, terms, settings["release"], hashes), "croissant"
         )
         hashes["croissant.json"] = sha256_file(tree / "croissant.json")
-        sums = "".join(f"{sha256}  {path}\n" for path, sha256 in sorted(hashes.items()))
-        (tree / "SHA256SUMS").write_text(sums, encoding="utf-8")
+        _write_sums(tree, hashes)
 
     write_report(
         report,
@@ -118,6 +145,7 @@ def assemble(
         settings=settings,
         inputs={"checksums": out / "SHA256SUMS"}
         | ({"split_report": split_report} if split_report else {})
+        | ({"previous": previous / "release.json"} if previous else {})
         | {f"package_{item['id']}": Path(item["package"]) / "inventory.parquet" for item in ordered},
         counts={
             "sequences": len(rows),
@@ -125,6 +153,7 @@ def assemble(
             "files": document["files"],
             "bytes": document["bytes"],
             "tree_files": len(hashes) + 1,
+            "retractions": len(retracted),
             **{f"frames_{split}": count for split, count in document["frames"].items()},
         },
         gates=gates,
@@ -189,6 +218,11 @@ def _overrides(tree: Path, sequences: Sequence[str]) -> list[dict[str, str]]:
         for gate in stated["gates"]
         if gate["verdict"] == "overridden"
     ]
+
+
+def _write_sums(tree: Path, hashes: Mapping[str, str]) -> None:
+    sums = "".join(f"{sha256}  {path}\n" for path, sha256 in sorted(hashes.items()))
+    (tree / "SHA256SUMS").write_text(sums, encoding="utf-8")
 
 
 def _hash_rest(tree: Path, known: Mapping[str, str]) -> dict[str, str]:

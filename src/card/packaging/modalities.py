@@ -1,5 +1,6 @@
 """The files of each modality of a sequence, named as members of its shards."""
 
+import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -73,7 +74,8 @@ def image_entries(
                 wanted=f"{raw[:12]}; anonymize the sequence again",
             )
         name = member_name(sequence, row["frame"], camera)
-        entries.append(Entry(Source(name, anonymized / image["file"], image["sha256"]), row["frame"], None))
+        source = Source(name, row["frame"], anonymized / image["file"], image["sha256"])
+        entries.append(Entry(source, row["frame"], None))
     return entries
 
 
@@ -87,7 +89,7 @@ def burst_entries(
             continue
         path = folder / Path(row["file"]).name
         sha256 = recorded_hash(hashes, f"{lidar}/{path.name}")
-        source = Source(member_name(sequence, row["burst"], lidar), path, sha256)
+        source = Source(member_name(sequence, row["burst"], lidar), row["burst"], path, sha256)
         entries.append(Entry(source, None, row["burst"]))
     return entries
 
@@ -105,7 +107,9 @@ def ground_truth_entries(sequence: str, frames: Rows, folder: Path) -> list[Entr
     hashes = dict(_inventory(folder))
     return [
         Entry(
-            Source(member_name(sequence, row["frame"], "ground_truth"), folder / name, hashes[name]),
+            Source(
+                member_name(sequence, row["frame"], "ground_truth"), row["frame"], folder / name, hashes[name]
+            ),
             row["frame"],
             None,
         )
@@ -124,17 +128,14 @@ def label_entries(sequence: str, states: Rows, labels: Rows, classes: Sequence[s
         values = (box[name] for name in ("x_center", "y_center", "width", "height"))
         text = " ".join(repr(float(value)) for value in values)
         lines.setdefault(box["frame"], []).append(f"{classes.index(box['class'])} {text}\n")
-    return [
-        Entry(
-            Source(
-                member_name(sequence, row["frame"], "labels"), "".join(lines.get(row["frame"], ())).encode()
-            ),
-            row["frame"],
-            None,
-        )
-        for row in states
-        if row["state"] != "not_reviewed"
-    ]
+    entries = []
+    for row in states:
+        if row["state"] != "not_reviewed":
+            content = "".join(lines.get(row["frame"], ())).encode()
+            name = member_name(sequence, row["frame"], "labels")
+            source = Source(name, row["frame"], content, hashlib.sha256(content).hexdigest())
+            entries.append(Entry(source, row["frame"], None))
+    return entries
 
 
 def _inventory(folder: Path) -> list[tuple[str, str]]:

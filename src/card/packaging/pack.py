@@ -11,6 +11,7 @@ from card.artifacts import (
     Figure,
     atomic_folder,
     inventory,
+    load_schema,
     progress,
     read_json,
     read_table,
@@ -20,20 +21,13 @@ from card.artifacts import (
     write_table,
 )
 from card.errors import CardError
+from card.packaging.entries import gather_entries
 from card.packaging.frame_rows import frame_columns
-from card.packaging.modalities import (
-    CAMERAS,
-    LIDARS,
-    Entry,
-    burst_entries,
-    ground_truth_entries,
-    image_entries,
-    label_entries,
-    recorded_hash,
-)
+from card.packaging.modalities import Entry, recorded_hash
 from card.packaging.quality import gather_quality
 from card.packaging.sequence_row import sequence_document
 from card.packaging.shards import write_shards
+from card.packaging.takedowns import Takedown, gone, tombstones
 
 Settings = Mapping[str, Any]
 
@@ -61,10 +55,13 @@ def pack_sequence(
     anonymized: Path | None = None,
     labels: Path | None = None,
     label_states: Path | None = None,
+    regions: Path | None = None,
+    takedowns: Sequence[Takedown] = (),
 ) -> None:
     """Pack one sequence into the folder `out`; what it lacks (None) is left out.
 
-    Raw images are not among the inputs, and no split is: a package stays as it is when splits change.
+    Raw images are not among the inputs, and no split is: a package stays as it is when splits change. Shards
+    of an earlier package in `out` that stay the same are not written again.
 
     Parameters
     ----------
@@ -73,17 +70,16 @@ def pack_sequence(
     recording_inventory : names and hashes of the raw recording.
     lidar_front, lidar_rear : folders of raw bursts; ground_truth, anonymized : folders of their stages.
     reports : stage -> report of every stage this package stands on.
+    takedowns : entries of `read_takedowns` for this sequence; regions : folder of images filled for them.
 
-    CardError for an image that was not anonymized or from another raw image, images without a privacy
-    report, content that differs from the hash its stage recorded, a failed gate (see `quality`), and
-    artifacts that break their schema.
+    CardError for an image that was not anonymized or from another raw image, a region that was not filled,
+    a takedown of frames that are not there, images without a privacy report, content that differs from the
+    hash its stage recorded, a failed gate (see `quality`), and artifacts that break their schema.
     """
     if anonymized and "privacy" not in reports:
         raise CardError("images without a report of the privacy stage", where=f"sequence {sequence['id']}")
     quality = gather_quality(sequence["id"], reports)
-    frame_table = read_table(frames, "frames")
-    frame_rows = frame_table.to_pylist()
-    lidars = {"lidar_front": lidar_front, "lidar_rear": lidar_rear}
+    all_frames = read_table(frames, "frames").to_pylist()
     states = read_table(label_states, "label_states").to_pylist() if label_states else []
     boxes = read_table(labels, "labels").to_pylist() if labels else []
     raw = read_table(recording_inventory, "inventory").to_pydict()
@@ -92,21 +88,23 @@ def pack_sequence(
     if imu and sha256_file(imu) != recorded_hash(hashes, "imu.parquet"):
         raise CardError("content differs from what ingest recorded", where=imu)
 
-    entries: dict[str, list[Entry]] = {}
-    if anonymized:
-        entries |= {
-            camera: image_entries(sequence["id"], camera, frame_rows, anonymized, hashes)
-            for camera in CAMERAS
-        }
     burst_rows = read_table(bursts, "bursts").to_pylist()
-    for lidar in LIDARS:
-        folder = lidars[lidar]
-        if folder:
-            entries[lidar] = burst_entries(sequence["id"], lidar, burst_rows, folder, hashes)
-    if ground_truth:
-        entries["ground_truth"] = ground_truth_entries(sequence["id"], frame_rows, ground_truth)
-    if label_states:
-        entries["labels"] = label_entries(sequence["id"], states, boxes, settings["classes"])
+    entries = gather_entries(
+        sequence["id"],
+        frames=all_frames,
+        bursts=burst_rows,
+        hashes=hashes,
+        lidars={"lidar_front": lidar_front, "lidar_rear": lidar_rear},
+        ground_truth=ground_truth,
+        anonymized=anonymized,
+        regions=regions,
+        states=states if label_states else None,
+        boxes=boxes,
+        classes=settings["classes"],
+        takedowns=takedowns,
+    )
+    taken = gone(takedowns, all_frames)["camera_left"]
+    frame_rows = [row for row in all_frames if row["frame"] not in taken]
 
     sidecars = {
         "calibration.json": (calibration, "calibration"),
@@ -123,12 +121,20 @@ def pack_sequence(
         "label_states": label_states,
         "ground_truth": ground_truth / "inventory.parquet" if ground_truth else None,
         "anonymized": anonymized / "inventory.parquet" if anonymized else None,
+        "regions": regions / "inventory.parquet" if regions else None,
         **{Path(name).stem: path for name, (path, _) in sidecars.items()},
     }
     sources = {name: path for name, path in files.items() if path is not None}
 
     with atomic_folder(out) as folder:
-        members = _write_members(folder, sequence["id"], spdx, entries, settings)
+        members = _write_members(folder, sequence["id"], spdx, entries, settings, previous=out / "data")
+        stones = tombstones(takedowns, all_frames)
+        names = load_schema("package_retractions")["columns"]
+        write_table(
+            folder / "retractions.parquet",
+            {name: [row[name] for row in stones] for name in names},
+            "package_retractions",
+        )
         coverage = (
             read_table(ground_truth / "coverage.parquet", "coverage").to_pylist() if ground_truth else []
         )
@@ -174,7 +180,12 @@ def pack_sequence(
 
 
 def _write_members(
-    folder: Path, sequence: str, spdx: str, entries: Mapping[str, Sequence[Entry]], settings: Settings
+    folder: Path,
+    sequence: str,
+    spdx: str,
+    entries: Mapping[str, Sequence[Entry]],
+    settings: Settings,
+    previous: Path,
 ) -> dict[str, list[Any]]:
     """Write the shards and `members.parquet`; shard paths are those of the release tree."""
     (folder / "data").mkdir()
@@ -183,7 +194,12 @@ def _write_members(
     for modality, found in progress(sorted(entries.items()), f"pack {sequence}"):
         by_name = {entry.source.name: entry for entry in found}
         members = write_shards(
-            (entry.source for entry in found), folder / "data", modality, settings["shard_max_bytes"]
+            (entry.source for entry in found),
+            folder / "data",
+            modality,
+            max_bytes=settings["shard_max_bytes"],
+            numbers=settings["shard_frames"],
+            previous=previous,
         )
         for member in members:
             entry = by_name[member.name]

@@ -35,6 +35,7 @@ class Contents:
     sequences: list[Row] = field(default_factory=list)
     mini: list[Row] = field(default_factory=list)
     members: list[Row] = field(default_factory=list)
+    retractions: list[Row] = field(default_factory=list)
     sidecars: dict[str, dict[str, Any]] = field(default_factory=dict)  # by sequence and file name
     findings: list[str] = field(default_factory=list)
 
@@ -66,7 +67,7 @@ def read_contents(tree: Path) -> Contents:
     contents.frames = {split: rows(f"metadata/frames-{split}.parquet", "release_frames") for split in SPLITS}
     contents.sequences = rows("metadata/sequences.parquet", "release_sequences")
     contents.members = rows("metadata/members.parquet", "release_members")
-    rows("metadata/retractions.parquet", "retractions")
+    contents.retractions = rows("metadata/retractions.parquet", "retractions")
     contents.mini = rows("mini/mini.parquet", "release_mini")
     for row in contents.sequences:
         folder = f"sequences/{row['sequence']}"

@@ -15,13 +15,17 @@ def check_geometry(contents: Contents) -> Iterator[str]:
     numbers: dict[str, dict[int, int]] = {}
     for row in contents.all_frames():
         numbers.setdefault(row["sequence"], {})[row["frame"]] = row["t_ns"]
+    gone: dict[str, set[int]] = {}
+    for row in contents.retractions:
+        if row["modality"] == "camera_left" and not row["region"]:
+            gone.setdefault(row["sequence"], set()).add(row["frame"])
     for sequence, sidecars in sorted(contents.sidecars.items()):
         where = f"sequences/{sequence}"
         if calibration := sidecars.get("calibration.json"):
             for problem in _calibration(calibration):
                 yield f"{where}/calibration.json: {problem}"
         if poses := sidecars.get("poses.json"):
-            for problem in _poses(poses["poses"], numbers.get(sequence, {})):
+            for problem in _poses(poses["poses"], numbers.get(sequence, {}), gone.get(sequence, set())):
                 yield f"{where}/poses.json: {problem}"
         reported = sidecars.get("quality.json", {"stages": {}})["stages"]
         for stage, name in MADE.items():
@@ -39,7 +43,7 @@ def _calibration(calibration: Any) -> Iterator[str]:
         yield f"camera_left is not left of camera_right (x {left:g} and {right:g} m in rig)"
 
 
-def _poses(poses: Any, frames: dict[int, int]) -> Iterator[str]:
+def _poses(poses: Any, frames: dict[int, int], gone: set[int]) -> Iterator[str]:
     last: dict[str, int] = {}
     for row in poses:
         label = f"{row['sensor']} {row['index']}"
@@ -48,7 +52,9 @@ def _poses(poses: Any, frames: dict[int, int]) -> Iterator[str]:
         if row["t_ns"] <= last.get(row["sensor"], row["t_ns"] - 1):
             yield f"time of {label} does not increase"
         last[row["sensor"]] = row["t_ns"]
-        if row["sensor"] == "camera_left" and frames.get(row["index"]) != row["t_ns"]:
+        if row["sensor"] != "camera_left" or row["index"] in gone:
+            continue
+        if frames.get(row["index"]) != row["t_ns"]:
             yield f"pose of {label} is not at the time of its frame"
 
 

@@ -7,6 +7,7 @@ from itertools import pairwise
 from card.packaging.checks.contents import Contents, Row
 from card.packaging.checks.jpeg import jpeg_problems
 from card.packaging.modalities import LIDARS
+from card.packaging.retractions import remains
 
 PER_FRAME = ("camera_left", "camera_right", "ground_truth", "labels")
 
@@ -17,6 +18,7 @@ def check_tables(contents: Contents) -> Iterator[str]:
     yield from _check_sequences(contents)
     yield from _check_release(contents)
     yield from _check_mini(contents)
+    yield from _check_retractions(contents)
 
 
 def _check_frames(contents: Contents) -> Iterator[str]:
@@ -102,6 +104,19 @@ def _check_release(contents: Contents) -> Iterator[str]:
         sum(r["size"] for r in contents.members),
     ):
         yield "release.json: files or bytes are not those of metadata/members.parquet"
+
+
+def _check_retractions(contents: Contents) -> Iterator[str]:
+    sequences = [row["sequence"] for row in contents.sequences]
+    for name in remains(contents.retractions, contents.members, sequences):
+        yield f"metadata/retractions.parquet: {name} is retracted but there"
+    gone = {
+        (row["sequence"], row["frame"]) for row in contents.retractions if row["modality"] == "camera_left"
+    }
+    gone -= {(row["sequence"], row["frame"]) for row in contents.retractions if row["region"]}
+    for row in [*contents.all_frames(), *contents.mini]:
+        if (row["sequence"], row["frame"]) in gone:
+            yield f"metadata/retractions.parquet: {_name(row)} is retracted but has a row"
 
 
 def _check_mini(contents: Contents) -> Iterator[str]:
