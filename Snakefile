@@ -4,6 +4,8 @@
 #   snakemake validate --cores 2          the same without the rest of the embedded input
 #   snakemake report --cores 2            a page of maps, overlays and quality figures
 #   snakemake benchmark --cores 2         evaluate predictions on the release
+#   snakemake proposals --cores 2         let your detector propose labels, and compare them with the reviewed ones
+#   snakemake label_consistency --cores 2   how well that detector repeats the labels
 #   snakemake assign_splits --cores 2     give new sequences their rows in the splits ledger
 from snakemake.utils import min_version
 
@@ -24,6 +26,7 @@ include: "workflow/rules/wheels.smk"
 include: "workflow/rules/privacy.smk"
 include: "workflow/rules/annotations.smk"
 include: "workflow/rules/irregularities.smk"
+include: "workflow/rules/proposals.smk"
 include: "workflow/rules/splits.smk"
 include: "workflow/rules/packaging.smk"
 include: "workflow/rules/report.smk"

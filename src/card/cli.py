@@ -15,6 +15,7 @@ COMMANDS = (
     "card.splits.command",
     "card.benchmark.command",
     "card.simulation.command",
+    "card.annotations.command",
 )
 """Modules of one command each, with `add`, which adds it to the parser."""
 

@@ -1,8 +1,10 @@
 # The checked configuration, the sequences to build, settings and code of a stage, what a run says.
 import os
 import sys
+from dataclasses import asdict
 from pathlib import Path
 
+from card.annotations.loop.sample import read_sample
 from card.artifacts.code import code_hash
 from card.artifacts.documents import read_yaml
 from card.artifacts.schemas import check, load_schema, schema_folder, with_defaults

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from card.artifacts import Figure, progress, read_arrays, read_json, read_table, write_report, write_table
 from card.geometry import CameraModel, Trajectory, apply, from_json, transform
 from card.irregularities.profile import AGREES, DOUBTFUL, UNKNOWN, Profile, View, box_profile
-from card.irregularities.tables import box_columns, track_columns
+from card.irregularities.tables import box_columns, nearest_judged, track_columns
 from card.irregularities.tracks import track_boxes
 
 Array = NDArray[np.float64]
@@ -82,7 +82,7 @@ def link_irregularities(
         counts=_counts(rows, profiles, found),
         figures=_figures(profiles),
         gates=gates,
-        notes=_review_list(rows, profiles),
+        notes=_review_list(rows, profiles, found),
     )
 
 
@@ -154,6 +154,9 @@ def _counts(
     return {
         "boxes": len(rows),
         "tracks": int(found.max(initial=-1)) + 1,
+        "tracks_doubtful": sum(
+            profiles[best].verdict == DOUBTFUL for best in nearest_judged(profiles, found).values()
+        ),
         "boxes_without_place": int((found < 0).sum()),
         **{f"{name}_{verdict}": tally[name, verdict] for name, verdict in names},
     }
@@ -177,14 +180,18 @@ def _figures(profiles: Sequence[Profile]) -> list[Figure]:
     ]
 
 
-def _review_list(rows: Sequence[Mapping[str, Any]], profiles: Sequence[Profile]) -> list[str]:
-    """A line for each box that a person should look at again, the first of them."""
+def _review_list(
+    rows: Sequence[Mapping[str, Any]], profiles: Sequence[Profile], found: NDArray[np.int64]
+) -> list[str]:
+    """A line for each irregularity that a person should look at again: doubtful even from nearby."""
     lines = []
-    for row, profile in zip(rows, profiles, strict=True):
+    for track, best in nearest_judged(profiles, found).items():
+        row, profile = rows[best], profiles[best]
         if profile.verdict == DOUBTFUL:
             up, down = 100 * (profile.elevation_m or 0), 100 * (profile.depression_m or 0)
             wanted = "elevation" if row["class"] == "positive" else "depression"
             where = f"frame {row['frame']}, x {row['x_center']:.3f}, y {row['y_center']:.3f}"
-            lines.append(f"{where}: {row['class']} without {wanted}: {up:+.1f} cm, {-down:+.1f} cm")
+            what = f"{row['class']} without {wanted}: {up:+.1f} cm, {-down:+.1f} cm"
+            lines.append(f"{where} (track {track}): {what}")
     more = len(lines) - MOST_NOTES
     return lines[:MOST_NOTES] + ([f"and {more} more, verdict doubtful in the table"] if more > 0 else [])

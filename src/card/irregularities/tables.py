@@ -62,10 +62,10 @@ def track_columns(
             DOUBTFUL,
         )
     }
-    for track in range(int(tracks.max(initial=-1)) + 1):
+    bests = nearest_judged(profiles, tracks)
+    for track in bests:
         members = np.flatnonzero(tracks == track).tolist()
-        # What was judged is sharper than what was only placed; of that, the nearest.
-        best = min(members, key=lambda i: (profiles[i].verdict == UNKNOWN, profiles[i].distance_m))
+        best = bests[track]
         verdicts = [profiles[i].verdict for i in members]
         values = (
             track,
@@ -83,6 +83,17 @@ def track_columns(
         for name, value in zip(columns, values, strict=True):
             columns[name].append(value)
     return columns
+
+
+def nearest_judged(profiles: Sequence[Profile], tracks: NDArray[np.int64]) -> dict[int, int]:
+    """By track the nearest of its boxes that could be judged, or of all where none could."""
+    return {
+        track: min(
+            np.flatnonzero(tracks == track).tolist(),
+            key=lambda i: (profiles[i].verdict == UNKNOWN, profiles[i].distance_m or 0.0),
+        )
+        for track in range(int(tracks.max(initial=-1)) + 1)
+    }
 
 
 def _nullable(values: Array) -> list[float | None]:

@@ -9,6 +9,8 @@ from card.annotations.formats import coco, cvat, label_studio, voc, yolo
 from card.annotations.formats.collector import Collector
 from card.annotations.formats.expected import Expected
 
+Labels = Mapping[str, list[Box]]
+
 
 @dataclass(frozen=True)
 class Format:
@@ -19,7 +21,18 @@ class Format:
     """
 
     read: Callable[[Path, Collector], None]
-    write: Callable[[Path, Mapping[str, list[Box]], Expected], None]
+    write: Callable[[Path, Labels, Expected], None]
+
+    def offer(self, folder: Path, labels: Labels, proposals: Labels, expected: Expected) -> None:
+        """Write labels of reviewed images, and proposals for others.
+
+        Only Label Studio keeps the two apart; in the other formats a proposal looks like a label, so such a
+        folder must not come back before a person has seen all of it.
+        """
+        if self.write is label_studio.write:
+            label_studio.write(folder, labels, expected, proposals)
+        else:
+            self.write(folder, {**labels, **proposals}, expected)
 
 
 FORMATS: Mapping[str, Format] = {

@@ -86,21 +86,30 @@ def _read_result(result: Object, frame: int, fields: Fields, file: str, found: C
         found.add(frame, Box(name, x + width / 2, y + height / 2, width, height, value.line), file)
 
 
-def write(folder: Path, labels: Mapping[str, list[Box]], expected: Expected) -> None:
-    """Write ``annotations.json``, one line a task; images are served as local files."""
-    tasks = [
-        {
-            "id": number,
-            "data": {IMAGE: f"/data/local-files/?d={image}"},
-            "annotations": [{"result": results(boxes, expected), "was_cancelled": False}],
-        }
-        for number, (image, boxes) in enumerate(labels.items(), 1)
-    ]
+def write(
+    folder: Path,
+    labels: Mapping[str, list[Box]],
+    expected: Expected,
+    proposals: Mapping[str, list[Box]] | None = None,
+) -> None:
+    """Write ``annotations.json``, one line a task; images are served as local files.
+
+    proposals : boxes of other images; they become predictions, which are no review.
+    """
+    tasks: list[dict[str, object]] = []
+    for image, boxes in {**labels, **(proposals or {})}.items():
+        found = {"result": _results(boxes, expected)}
+        task: dict[str, object] = {"id": len(tasks) + 1, "data": {IMAGE: f"/data/local-files/?d={image}"}}
+        if image in labels:
+            task["annotations"] = [{**found, "was_cancelled": False}]
+        else:
+            task |= {"annotations": [], "predictions": [found]}
+        tasks.append(task)
     text = "[\n" + ",\n".join(json.dumps(task) for task in tasks) + "\n]\n"
     (folder / "annotations.json").write_text(text, encoding="utf-8")
 
 
-def results(boxes: list[Box], expected: Expected) -> list[dict[str, object]]:
+def _results(boxes: list[Box], expected: Expected) -> list[dict[str, object]]:
     """Rectangles of one image as Label Studio keeps them, in annotations and in predictions."""
     width, height = expected.rules.size
     return [

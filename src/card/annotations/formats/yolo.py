@@ -50,8 +50,13 @@ def write(folder: Path, labels: Mapping[str, list[Box]], expected: Expected) -> 
     (folder / FOLDER).mkdir(exist_ok=True)
     (folder / CLASSES).write_text("".join(f"{name}\n" for name in expected.classes), encoding="utf-8")
     for image, boxes in labels.items():
-        text = "".join(_line(box, expected.classes) for box in boxes)
+        text = lines(boxes, expected.classes)
         (folder / FOLDER / f"{Path(image).stem}.txt").write_text(text, encoding="utf-8")
+
+
+def lines(boxes: Sequence[Box], classes: Sequence[str]) -> str:
+    """Text of one label file."""
+    return "".join(_line(box, classes) for box in boxes)
 
 
 def _line(box: Box, classes: Sequence[str]) -> str:

@@ -1,0 +1,1 @@
+"""The assisted labelling loop: sample, export, propose, review (paper, supplement, Annotation Pipeline)."""
