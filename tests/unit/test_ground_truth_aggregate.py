@@ -115,6 +115,12 @@ def test_bytes_do_not_depend_on_threads(run, default):
     assert inventory(out) == inventory(default[0])
 
 
+def test_bytes_do_not_depend_on_blocks_of_frames(run, default, monkeypatch):
+    monkeypatch.setattr("card.ground_truth.aggregate.BLOCK_FRAMES", 1)
+    out, _ = run()
+    assert inventory(out) == inventory(default[0])
+
+
 def test_the_folder_is_whole_and_describes_itself(default):
     out, report = default
     table = read_table(out / "inventory.parquet", "inventory")

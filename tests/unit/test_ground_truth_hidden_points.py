@@ -4,8 +4,9 @@ from scipy.spatial import ConvexHull
 
 from card.artifacts import default_settings
 from card.errors import CardError
-from card.ground_truth.hidden_points import diagonal, two_pass_visibility
+from card.ground_truth.hidden_points import two_pass_visibility
 from card.ground_truth.hpr.visible import visible_points
+from card.ground_truth.selection import diagonal
 
 SETTINGS = default_settings("ground_truth")
 

@@ -5,11 +5,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from card.errors import CardError
-from card.ground_truth.hidden_points import diagonal
 from card.ground_truth.hpr import visible
-from card.ground_truth.hpr.reference import spans_space, visible_by_hull
 from card.ground_truth.hpr.visible import visible_points
 from card.ground_truth.hpr.workspace import Workspace
+from card.ground_truth.reference.hidden_points import spans_space, visible_by_hull
+from card.ground_truth.selection import diagonal
 
 KINDS = ("uniform", "ties", "duplicates", "plane", "tiny", "far", "ground", "one ray", "sphere")
 

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from card.ground_truth.mad import mad_inliers
-from card.ground_truth.thinning import thin
+from card.ground_truth.reference.mad import mad_inliers
+from card.ground_truth.reference.thinning import thin
 
 
 def points_at_radii(radii: list[float]) -> np.ndarray:

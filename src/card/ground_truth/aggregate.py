@@ -1,4 +1,4 @@
-"""Quasi-dense ground truth of a sequence: the reference path in plain numpy (paper, supplement A-E)."""
+"""Quasi-dense ground truth of a sequence: from bursts to clouds (paper, supplement A-E)."""
 
 from __future__ import annotations
 
@@ -23,14 +23,18 @@ from card.artifacts import (
 )
 from card.errors import CardError
 from card.geometry import Trajectory
-from card.ground_truth.coverage import frame_window
+from card.ground_truth.coverage import FrameWindow, frame_window
 from card.ground_truth.frame import build_frame
+from card.ground_truth.hpr.workspace import Workspace
 from card.ground_truth.left_camera import LeftCamera
 from card.ground_truth.static_set import StaticSet, static_voxels
 from card.ground_truth.static_window import StaticWindow
 from card.ground_truth.summary import write_summary
 from card.ground_truth.sweeps import Drive
 from card.ground_truth.voxels import unpack
+
+#: Frames whose bursts are ordered by voxel at once: more take more memory, fewer more time.
+BLOCK_FRAMES = 40
 
 
 def aggregate(
@@ -101,25 +105,28 @@ class _Work:
 
     def rows(self, tasks: Sequence[_Task]) -> Iterator[dict[str, Any]]:
         """Write the clouds of consecutive frames; yield their rows of schema ``coverage``."""
-        window = StaticWindow(self.drive, self.static)
-        for task in tasks:
-            selected = frame_window(self.drive, task.t_ns, task.keyframe >= 0, self.settings)
-            keyframe = self.drive.sweep(task.keyframe).points if task.keyframe >= 0 else np.empty((0, 3))
-            frame = build_frame(
-                window.cloud(selected.bursts),
-                keyframe,
-                task.keyframe,
-                self.drive.trajectory.at(task.t_ns),
-                self.static,
-                self.camera,
-                self.settings,
-            )
-            write_arrays(
-                self.folder / f"{task.frame:06d}.npz", {"points": frame.points}, "ground_truth_points"
-            )
-            width, height = self.camera.image.width, self.camera.image.height
-            share = len(np.unique(frame.pixels @ (1, width))) / (width * height)
-            yield {"frame": task.frame, **selected.columns, **frame.counts, "image_share": share}
+        workspace = Workspace()
+        window = StaticWindow(self.drive, self.static, self.camera, self.settings)
+        for start in range(0, len(tasks), BLOCK_FRAMES):
+            block = tasks[start : start + BLOCK_FRAMES]
+            selected = [
+                frame_window(self.drive, task.t_ns, task.keyframe >= 0, self.settings) for task in block
+            ]
+            window.open(np.unique(np.concatenate([frame.bursts for frame in selected])))
+            for task, frame in zip(block, selected, strict=True):
+                yield self._row(task, frame, window, workspace)
+
+    def _row(
+        self, task: _Task, selected: FrameWindow, window: StaticWindow, workspace: Workspace
+    ) -> dict[str, Any]:
+        world_from_rig = self.drive.trajectory.at(task.t_ns)
+        selection = window.select(selected.bursts, task.keyframe, world_from_rig)
+        keyframe = self.drive.sweep(task.keyframe).points if task.keyframe >= 0 else np.empty((0, 3))
+        frame = build_frame(selection, keyframe, world_from_rig, self.camera, self.settings, workspace)
+        write_arrays(self.folder / f"{task.frame:06d}.npz", {"points": frame.points}, "ground_truth_points")
+        width, height = self.camera.image.width, self.camera.image.height
+        share = len(np.unique(frame.pixels @ (1, width))) / (width * height)
+        return {"frame": task.frame, **selected.columns, **frame.counts, "image_share": share}
 
 
 def _tasks(frames: Path, drive: Drive) -> list[_Task]:

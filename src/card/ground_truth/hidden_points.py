@@ -10,14 +10,10 @@ import numpy.typing as npt
 
 from card.ground_truth.hpr.visible import visible_points
 from card.ground_truth.hpr.workspace import Workspace
+from card.ground_truth.selection import diagonal
 
 Points = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
-
-
-def diagonal(points: Points) -> float:
-    """D: diagonal, metres, of the axis-aligned bounding box of points (N, 3)."""
-    return float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
 
 
 def two_pass_visibility(

@@ -20,6 +20,7 @@ class LeftCamera:
     """The left camera of a calibration.
 
     image: the original, distorted image. undistorted: the image the ego mask belongs to.
+    ego: (H, W) bool, where the car itself is on the undistorted image.
     rig_from_camera: (4, 4).
     """
 
@@ -27,7 +28,7 @@ class LeftCamera:
         self.image = CameraModel.from_json(calibration["cameras"]["camera_left"])
         self.undistorted = CameraModel.from_json(calibration["camera_left_undistorted"])
         self.rig_from_camera = from_json(calibration["extrinsics"]["rig_from_camera_left"])
-        self._ego = read_ego_mask(ego_mask, self.undistorted.width, self.undistorted.height) == 255
+        self.ego = read_ego_mask(ego_mask, self.undistorted.width, self.undistorted.height) == 255
         border = self.image.rays(_border(self.image.width, self.image.height))[:, :2]
         self._low, self._high = border.min(axis=0), border.max(axis=0)
 
@@ -61,7 +62,7 @@ class LeftCamera:
         column, row = np.rint(self.undistorted.project(points)).T
         column = np.clip(column, 0, self.undistorted.width - 1).astype(np.int64)
         row = np.clip(row, 0, self.undistorted.height - 1).astype(np.int64)
-        return self._ego[row, column]
+        return self.ego[row, column]
 
     def raster(self, points: Points) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
         """Indices of the points (N, 3) on the original image, by row, column and depth; their pixels (K, 2).

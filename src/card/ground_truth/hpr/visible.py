@@ -12,10 +12,10 @@ from card.ground_truth.hpr.candidates import farthest, low_enough, near_enough
 from card.ground_truth.hpr.cells import EMPTY, Cells, assign, indices, lay_out, survey
 from card.ground_truth.hpr.insertion_order import by_rounds, morton_order
 from card.ground_truth.hpr.lift import COLUMNS, lift
-from card.ground_truth.hpr.reference import spans_space, visible_by_hull
 from card.ground_truth.hpr.triangulation import CORNERS, MAX_STEPS, Mesh, add_corners, lower_hull
 from card.ground_truth.hpr.upper_bound import upper_bound
 from card.ground_truth.hpr.workspace import Workspace
+from card.ground_truth.reference.hidden_points import spans_space, visible_by_hull
 
 Points = npt.NDArray[np.float64]
 

@@ -13,17 +13,18 @@ SPARE = 1.2
 
 
 class Workspace:
-    """Named buffers that grow with need. One belongs to one thread."""
+    """Named buffers that grow with need. One belongs to one user in one thread."""
 
     def __init__(self) -> None:
-        self._buffers: dict[str, npt.NDArray[Any]] = {}
+        self._buffers: dict[tuple[str, str], npt.NDArray[Any]] = {}
 
     def take(self, name: str, shape: int | tuple[int, ...], dtype: npt.DTypeLike) -> npt.NDArray[Any]:
-        """An array of this shape with any content; it is the same memory at every call by this name."""
+        """An array of this shape with any content: the same memory at every call by this name and type."""
         size = prod(shape) if isinstance(shape, tuple) else shape
-        buffer = self._buffers.get(name)
+        key = name, np.dtype(dtype).str
+        buffer = self._buffers.get(key)
         if buffer is None or buffer.size < size:
-            buffer = self._buffers[name] = np.empty(int(size * SPARE), dtype)
+            buffer = self._buffers[key] = np.empty(int(size * SPARE), dtype)
         return buffer[:size].reshape(shape)
 
     @property

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from card.ground_truth.runs import runs_by_voxel
+from card.ground_truth.reference.runs import runs_by_voxel
 
 _LOW = (1 << 32) - 1
 
@@ -34,9 +34,11 @@ def mad_inliers(
         return np.zeros(0, dtype=np.bool_)
     order, starts, counts = runs_by_voxel(voxel)
     ordered = points[order].astype(np.float64)
-    means = np.add.reduceat(ordered, starts) / counts[:, None]
     group = np.repeat(np.arange(len(starts)), counts)
-    radii = np.linalg.norm(ordered - means[group], axis=1).astype(np.float32)
+    # Added up one after the other, in the order given: other sums round differently.
+    means = np.stack([np.bincount(group, axis) for axis in ordered.T], axis=1) / counts[:, None]
+    x, y, z = (ordered - means[group]).T
+    radii = np.sqrt(x * x + y * y + z * z).astype(np.float32)
     deviations = np.abs(radii - _medians(radii, group, starts, counts)[group])
     mad = _medians(deviations, group, starts, counts)
     inliers = (deviations if form == "deviation" else radii) <= np.float32(multiplier) * mad[group]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from card.ground_truth.runs import runs_by_voxel
+from card.ground_truth.reference.runs import runs_by_voxel
 
 
 def thin(voxel: npt.NDArray[np.int32], limit: int) -> npt.NDArray[np.bool_]:
