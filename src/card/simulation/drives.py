@@ -32,6 +32,7 @@ class Drive:
     crossing_s : when walkers cross before the car, s after the cameras start; None for never.
     walker_spacing : metres between walkers along the road.  oncoming_s, parked_spacing : s, m between cars.
     leader, follower : a car ahead of us in our lane, one behind us.
+    loads : what gets in: (s after the cameras start, kg, x and y in ``rig``).
     night : dark, with street lamps and headlights.
     lasts_s : no scale's recording is longer.
     bag : delivered as a rosbag2 with packets.
@@ -58,6 +59,7 @@ class Drive:
     parked_spacing: float = 0.0
     leader: bool = False
     follower: bool = False
+    loads: tuple[tuple[float, float, float, float], ...] = ()
     night: bool = False
     lasts_s: float = math.inf
     bag: bool = False
@@ -223,6 +225,7 @@ FURTHER_DRIVES = {
         walker_spacing=6.0,
         oncoming_s=7.0,
         parked_spacing=18.0,
+        loads=((9.5, 85.0, 0.4, -1.5),),
         follower=True,
     ),
 }

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from card.geometry import CameraModel, apply, inverse
+from card.geometry import CameraModel
 from card.simulation.irregularities import Irregularity
 from card.simulation.road import Road
 from card.simulation.traffic import Thing
@@ -25,6 +25,7 @@ class Box:
     """A box in an original image, its edges in px (a pixel spans -0.5..0.5 about its centre).
 
     kind : positive, negative, face or plate.  thing : index of what it shows.  visible : its pixels in sight.
+    share : of its silhouette within the image, 0 to 1, the share that is in sight, see `occlusion`.
     """
 
     kind: str
@@ -34,19 +35,30 @@ class Box:
     x_max: float
     y_max: float
     visible: int
+    share: float = 1.0
 
 
 def private_boxes(seen: NDArray[np.int32], things: Sequence[Thing]) -> list[Box]:
-    """Boxes around the visible pixels of faces and plates in an image of thing indices (H, W)."""
+    """Boxes around what is in sight of faces and plates in an image of thing indices (H, W)."""
+    return _boxes(seen, {i: thing.kind for i, thing in enumerate(things) if thing.kind in ("face", "plate")})
+
+
+def road_boxes(seen: NDArray[np.int32], road: Road) -> list[Box]:
+    """Boxes around what is in sight of bumps and potholes in an image of thing indices (H, W)."""
+    kinds = {i: _LABELLED[t.kind] for i, t in enumerate(road.irregularities) if t.kind in _LABELLED}
+    return _boxes(seen, kinds)
+
+
+def _boxes(seen: NDArray[np.int32], kinds: dict[int, str]) -> list[Box]:
     from scipy.ndimage import find_objects
 
     boxes = []
     for index, window in enumerate(find_objects(seen + 1)):
-        if window is None or things[index].kind not in ("face", "plate"):
+        if window is None or index not in kinds:
             continue
         rows, columns = window
         box = Box(
-            things[index].kind,
+            kinds[index],
             index,
             columns.start - 0.5,
             rows.start - 0.5,
@@ -54,31 +66,6 @@ def private_boxes(seen: NDArray[np.int32], things: Sequence[Thing]) -> list[Box]
             rows.stop - 0.5,
             int(np.count_nonzero(seen[window] == index)),
         )
-        if _worth_labelling(box):
-            boxes.append(box)
-    return boxes
-
-
-def road_boxes(
-    seen: NDArray[np.int32], road: Road, camera: CameraModel, world_from_camera: Array
-) -> list[Box]:
-    """Boxes around the whole extent, cut at the image's edge, of the bumps and potholes in sight."""
-    boxes = []
-    pixels_of = np.bincount(seen[seen >= 0], minlength=len(road.irregularities))
-    for index, thing in enumerate(road.irregularities):
-        visible = int(pixels_of[index])
-        if thing.kind not in _LABELLED or visible < _FEWEST_PX:
-            continue
-        points = apply(inverse(world_from_camera), outline(road, thing))
-        # The lens model folds back far outside the image: keep to what is in front and near the view.
-        ahead = points[(points[:, 2] > 0.3) & (np.abs(points[:, 0]) < 1.2 * points[:, 2])]
-        if not len(ahead):
-            continue
-        pixels = camera.project(ahead)
-        x_min, y_min = np.maximum(pixels.min(axis=0), -0.5)
-        x_max, y_max = np.minimum(pixels.max(axis=0), (camera.width - 0.5, camera.height - 0.5))
-        kind = _LABELLED[thing.kind]
-        box = Box(kind, index, float(x_min), float(y_min), float(x_max), float(y_max), visible)
         if _worth_labelling(box):
             boxes.append(box)
     return boxes

@@ -9,6 +9,7 @@ from card.recording.paths import image_path
 from card.simulation.camera import Camera
 from card.simulation.exposure import jpeg
 from card.simulation.labels import CLASSES, Box, private_boxes, road_boxes, yolo_lines
+from card.simulation.occlusion import with_shares
 from card.simulation.raycast import Scene, Tracer
 from card.simulation.rig import CAMERAS, STEREO_DELAY_NS
 from card.simulation.shading import Shader
@@ -40,19 +41,19 @@ class Photographer:
     def photograph(self, name: str, numbers: range, recording: Path) -> list[Shown]:
         """Write images ``numbers`` of one camera; what a label could be drawn around in them."""
         world, found = self._world, []
-        model, pose = world.rig.cameras[name], world.rig.rig_from[name]
         for number in numbers:
             t_ns, noise = exposures(world, name)[number], world.rng(f"noise of {name} {number}")
             picture = self._cameras[name].shoot(t_ns, noise)
             image_path(recording, name, t_ns).write_bytes(jpeg(picture.rgb))
             boxes = private_boxes(picture.thing, world.things)
-            boxes += road_boxes(picture.thing, world.road, model, world.path.at(t_ns) @ pose)
+            boxes += road_boxes(picture.thing, world.road)
             found += [(name, t_ns, box) for box in boxes]
         return found
 
 
 def write_labels(world: World, found: list[Shown], recording: Path, truth: Path) -> None:
     """``annotations/``, ``privacy_labels.csv`` and the truth's ``boxes.parquet`` of all images."""
+    found = with_shares(world, found)
     _write_annotations(world, found, recording / "annotations")
     _write_privacy_labels(found, recording / "privacy_labels.csv")
     columns = {

@@ -12,6 +12,7 @@ from card.geometry import Trajectory
 from card.recording.paths import imu_path
 from card.simulation.deliveries import as_bag, write_trajectory
 from card.simulation.footprint import wheel_contacts
+from card.simulation.frame_truth import write_frame_truth
 from card.simulation.imu import ImuErrors, imu_times, measured_imu
 from card.simulation.record import write_photographs, write_sweeps
 from card.simulation.rig import CAMERAS, LIDARS, WHEELS
@@ -49,7 +50,7 @@ def simulate_drive(
 
 
 def write_motion(world: World, recording: Path, truth: Path) -> Trajectory:
-    """IMU table, true trajectory, wheels and mesh; the true trajectory at IMU rate is returned."""
+    """IMU table, true trajectory, wheels, frames and mesh; the true trajectory at IMU rate is returned."""
     times = imu_times(world.start_ns, world.scale.duration_s)
     write_table(imu_path(recording), measured_imu(world.path, times, ImuErrors(), world.rng("imu")), "imu")
     rows = np.searchsorted(world.path.t_ns, times)
@@ -70,6 +71,7 @@ def write_motion(world: World, recording: Path, truth: Path) -> Trajectory:
         {"vertices": mesh.vertices, "triangles": mesh.triangles, "surface": mesh.surface},
         "truth_world",
     )
+    write_frame_truth(world, truth)
     return path
 
 

@@ -1,4 +1,4 @@
-"""A quarter car's response: how much of the ground's motion reaches the body."""
+"""The car's springs: how much of the ground's motion reaches the body, and how air keeps it at its height."""
 
 from dataclasses import dataclass
 
@@ -44,3 +44,39 @@ def sprung(ground: Array, mode: QuarterCar, step_s: float) -> Array:
 
     b, a = bilinear(*mode.transfer(), fs=1.0 / step_s)
     return np.asarray(lfilter(b, a, ground - ground[0]) + ground[0])
+
+
+#: How fast the air suspension lets air in or out, s.
+LEVELLING_S = 10.0
+#: Sprung mass, its radii of gyration about the roll and pitch axes, and its middle along the car in ``rig``.
+MASS_KG, ROLL_RADIUS_M, PITCH_RADIUS_M, MIDDLE_Y_M = 2100.0, 0.6, 1.3, -0.7
+_GRAVITY_M_S2 = 9.81
+
+
+def levelled(deflection: Array, step_s: float, time_constant_s: float = LEVELLING_S) -> Array:
+    """What an air suspension leaves of a static deflection (N,) of its springs, level at the start.
+
+    It adds or takes air at a rate proportional to the deflection: y' = x' - y / T. A step dies away as
+    exp(-t / T); a steady rate r leaves r T.
+    """
+    from scipy.signal import bilinear, lfilter
+
+    b, a = bilinear([time_constant_s, 0.0], [time_constant_s, 1.0], fs=1.0 / step_s)
+    return np.asarray(lfilter(b, a, deflection - deflection[0]))
+
+
+def sag(mass_kg: float, x_m: float, y_m: float) -> tuple[float, float, float]:
+    """Static heave (m) and slopes to the right and ahead (rad) that a mass at (x, y) in ``rig`` causes.
+
+    Each mode's stiffness is its inertia times its squared natural frequency.
+    """
+    weight = mass_kg * _GRAVITY_M_S2
+
+    def stiffness(inertia: float, mode: QuarterCar) -> float:
+        return inertia * float(2 * np.pi * mode.body_hz) ** 2
+
+    return (
+        -weight / stiffness(MASS_KG, HEAVE),
+        -weight * x_m / stiffness(MASS_KG * ROLL_RADIUS_M**2, ROLL),
+        -weight * (y_m - MIDDLE_Y_M) / stiffness(MASS_KG * PITCH_RADIUS_M**2, PITCH),
+    )

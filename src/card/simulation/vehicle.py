@@ -9,16 +9,19 @@ from card.geometry import Trajectory, quaternion_from_matrix
 from card.simulation.footprint import footprint_height
 from card.simulation.rig import FRONT_AXLE_Y_M, HALF_TRACK_M, REAR_AXLE_Y_M, RIG_HEIGHT_M
 from card.simulation.road import Road
-from card.simulation.suspension import HEAVE, PITCH, ROLL, sprung
+from card.simulation.suspension import HEAVE, PITCH, ROLL, levelled, sag, sprung
 
 Array = NDArray[np.float64]
 
 RATE_HZ = 1000
 #: The car is simulated this much longer at both ends: its springs have settled when the recording starts.
 MARGIN_S = 2.0
+_SMOOTHING_S = 0.15
 _PROFILE_STEP_M = 0.025
-#: Lean of the body in braking and in bends, rad per m/s^2.
-_DIVE, _LEAN = 0.004, 0.006
+#: Lean of the body in braking and in bends, rad per m/s^2, and the weight's share on a slope.
+_DIVE, _LEAN, _GRAVITY_M_S2 = 0.004, 0.006, 9.81
+#: How long a load takes to get in, s.
+_BOARDING_S = 1.5
 _WHEELS_XY = np.array([[x * HALF_TRACK_M, y] for y in (FRONT_AXLE_Y_M, REAR_AXLE_Y_M) for x in (-1, 1)])
 
 
@@ -52,7 +55,7 @@ class Lane:
 
 
 def course(speeds: list[tuple[float, float]], start_s: float, duration_s: float) -> Course:
-    """The course of a speed profile given as knots (t in s, v in m/s), smoothed over half a second."""
+    """The course of a speed profile given as knots (t in s, v in m/s), its corners rounded a little."""
     from scipy.interpolate import PchipInterpolator
     from scipy.ndimage import gaussian_filter1d
 
@@ -60,13 +63,27 @@ def course(speeds: list[tuple[float, float]], start_s: float, duration_s: float)
     t = np.arange(count) / RATE_HZ - MARGIN_S
     knots_t, knots_v = np.array(speeds).T
     v = PchipInterpolator(knots_t, knots_v)(np.clip(t, knots_t[0], knots_t[-1]))
-    v = gaussian_filter1d(v, 0.5 * RATE_HZ, mode="nearest")
+    v = gaussian_filter1d(v, _SMOOTHING_S * RATE_HZ, mode="nearest")
     travelled = np.concatenate([[0.0], np.cumsum((v[1:] + v[:-1]) / 2) / RATE_HZ])
     return Course(t, start_s + travelled - np.interp(0.0, t, travelled))
 
 
-def ride(road: Road, lane: Lane, where: Course, start_ns: int) -> Trajectory:
-    """``world_from_rig`` at RATE_HZ of the car on its course; time 0 of the course is ``start_ns``."""
+@dataclass(frozen=True)
+class Load:
+    """A mass (kg) that gets in at ``time`` (s of the course) at (x, y) in ``rig``, m."""
+
+    time: float
+    mass_kg: float
+    x_m: float
+    y_m: float
+
+
+def ride(road: Road, lane: Lane, where: Course, start_ns: int, loads: tuple[Load, ...] = ()) -> Trajectory:
+    """``world_from_rig`` at RATE_HZ of the car on its course; time 0 of the course is ``start_ns``.
+
+    The body follows the plane through its wheels as far as the springs let it. Slopes, bends, braking and
+    ``loads`` deflect them; the air suspension takes that back in its own time.
+    """
     s = np.arange(where.s[0] - 1.0, where.s[-1] + 1.0, _PROFILE_STEP_M)
     xy, forward = _track(road, lane, s)
     right = np.stack([forward[:, 1], -forward[:, 0]], axis=1)
@@ -83,16 +100,31 @@ def ride(road: Road, lane: Lane, where: Course, start_ns: int) -> Trajectory:
     velocity = np.gradient(xy, where.t, axis=0)
     acceleration = np.gradient(velocity, where.t, axis=0)
     left = np.stack([-forward[:, 1], forward[:, 0]], axis=1)
-    ahead = ahead + _DIVE * np.sum(acceleration * forward, axis=1)
-    across = across - _LEAN * np.sum(acceleration * left, axis=1)
+    # Uphill is like accelerating, a slope to the left like a bend to the right.
+    dive = _DIVE * (np.sum(acceleration * forward, axis=1) + _GRAVITY_M_S2 * ahead)
+    lean = -_LEAN * (np.sum(acceleration * left, axis=1) - _GRAVITY_M_S2 * across)
+    sags = _sags(loads, where.t)
     height, across, ahead = (
-        sprung(value, mode, 1.0 / RATE_HZ)
-        for value, mode in ((height, HEAVE), (across, ROLL), (ahead, PITCH))
+        sprung(ground + levelled(spring, 1.0 / RATE_HZ), mode, 1.0 / RATE_HZ)
+        for ground, spring, mode in (
+            (height, sags[0], HEAVE),
+            (across, sags[1] + lean, ROLL),
+            (ahead, sags[2] + dive, PITCH),
+        )
     )
     rotation = _upright_on(forward, across, ahead)
     z = height + RIG_HEIGHT_M / rotation[:, 2, 2]
     t_ns = start_ns + np.round(where.t * RATE_HZ).astype(np.int64) * (1_000_000_000 // RATE_HZ)
     return Trajectory(t_ns, np.column_stack([xy, z]), quaternion_from_matrix(rotation))
+
+
+def _sags(loads: tuple[Load, ...], t: Array) -> Array:
+    """Static heave (m) and slopes to the right and ahead (3, N) under what has got in by times (N,)."""
+    total = np.zeros((3, len(t)))
+    for load in loads:
+        share = np.clip((t - load.time) / _BOARDING_S, 0.0, 1.0)
+        total += np.array(sag(load.mass_kg, load.x_m, load.y_m))[:, None] * share
+    return total
 
 
 def _track(road: Road, lane: Lane, s: Array) -> tuple[Array, Array]:

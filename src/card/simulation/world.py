@@ -20,7 +20,7 @@ from card.simulation.road_plan import plan
 from card.simulation.scales import Scale, scale_named
 from card.simulation.spectrum import roughness
 from card.simulation.traffic import Thing, Traffic
-from card.simulation.vehicle import Course, Lane, course, ride
+from card.simulation.vehicle import Course, Lane, Load, course, ride
 
 Array = NDArray[np.float64]
 
@@ -86,7 +86,8 @@ def world_of(name: str, drive: Drive, size: Scale, seed: int) -> World:
         np.eye(4),
     )
     lane = Lane(drive.section.lane, 0.12, 65.0 if not line.closed else line.length / 3, rng.uniform(0, 6))
-    path = ride(road, lane, where, start_ns)
+    loads = tuple(Load(t + begin, *load) for t, *load in drive.loads)
+    path = ride(road, lane, where, start_ns, loads)
     world_from_map = _level(inverse(path.at(start_ns)))
     road = road.placed(world_from_map)
     path = Trajectory(path.t_ns, *_parts(world_from_map @ path.at(path.t_ns)))
