@@ -184,9 +184,9 @@ def _pack(
     folder = tree / "data" / sequence
     folder.mkdir(parents=True, exist_ok=True)
     named = {f"{sequence}/{number:06d}.{modality}": number for number in contents}
-    given = [Source(name, contents[number]) for name, number in named.items()]
+    given = [Source(name, number, contents[number]) for name, number in named.items()]
     burst = modality.startswith("lidar")
-    for member in write_shards(given, folder, modality, 10**8) if given else ():
+    for member in write_shards(given, folder, modality, max_bytes=10**8, numbers=1000) if given else ():
         number = named[member.name]
         rows.append(
             {

@@ -12,17 +12,15 @@ from card.benchmark.frame_scores import (
     INPUT_PIXELS,
     SCALINGS,
     Evaluated,
-    evaluated_pixels,
     frame_scores,
-    slopes,
 )
 from card.benchmark.frames import (
     CLASSES,
     Loaded,
     Method,
     Selection,
-    SequenceView,
     SequenceViews,
+    evaluated,
     key,
     load,
     loaded,
@@ -72,7 +70,7 @@ def evaluate(
     counts = dict.fromkeys(("boxes", "empty_boxes", "pixels", "pixels_out_of_view", "frames_without_road"), 0)
     frames = loaded(opened, selection, method, views)
     for frame, view in progress(frames, "evaluate", len(selection.rows)):
-        given, unseen = _evaluated(frame, view, settings)
+        given, unseen = evaluated(frame, view, settings)
         counts["pixels_out_of_view"] += unseen
         counts["pixels"] += given.truth.size
         counts["frames_without_road"] += frame.road_from_camera is None
@@ -123,19 +121,6 @@ def evaluate(
     return document
 
 
-def _evaluated(frame: Loaded, view: SequenceView, settings: Mapping[str, Any]) -> tuple[Evaluated, int]:
-    """The pixels of a frame that count, and how many the predicted image does not see."""
-    limits = (settings["min_depth_m"], settings["max_depth_m"])
-    pixels, truth = view.view.truth(frame.points, limits)
-    road = frame.road_from_camera
-    if view.space.name == "original":
-        return evaluated_pixels(view.view, pixels, truth, frame.prediction, road), 0
-    rays = view.view.rays[pixels]
-    depth, seen = view.space.sample(frame.prediction, rays)
-    given = Evaluated(pixels, truth, depth, slopes(rays, road))
-    return given.part(seen), int(np.count_nonzero(~seen))
-
-
 def _not_input(release: Release, frame: Loaded, given: Evaluated, settings: Mapping[str, Any]) -> Any:
     sparse = sparse_depth(release, frame.row)
     return ~input_pixels(given.pixels, given.truth, sparse, settings["input_tolerance_m"])
@@ -150,7 +135,7 @@ def _check_plausible(
     for row in selection.rows[::step][:PROBES]:
         view = views.of(row["sequence"])
         frame = load(release, row, selection.files[key(row)], method, view)
-        given, _ = _evaluated(frame, view, settings)
+        given, _ = evaluated(frame, view, settings)
         if (given.prediction > 0).any():
             ratios.append(1 / median_scale(given.truth, given.prediction))
         probes.append((frame.prediction, frame.points, view.rig))

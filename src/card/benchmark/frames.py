@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from card.benchmark.frame_scores import Evaluated, evaluated_pixels, slopes
 from card.benchmark.image_space import ImageSpace, image_space
 from card.benchmark.predictions import Frame, find_predictions, read_prediction
 from card.benchmark.truth import View
@@ -118,6 +119,19 @@ def load(release: Release, row: Row, path: Path, method: Method, view: SequenceV
         release.road(*key(row)),
         read_prediction(path, view.space, (other,), method.unit_m),
     )
+
+
+def evaluated(frame: Loaded, view: SequenceView, settings: Mapping[str, Any]) -> tuple[Evaluated, int]:
+    """The pixels of a frame that count, and how many more the predicted image does not see."""
+    limits = (settings["min_depth_m"], settings["max_depth_m"])
+    pixels, truth = view.view.truth(frame.points, limits)
+    road = frame.road_from_camera
+    if view.space.name == "original":
+        return evaluated_pixels(view.view, pixels, truth, frame.prediction, road), 0
+    rays = view.view.rays[pixels]
+    depth, seen = view.space.sample(frame.prediction, rays)
+    given = Evaluated(pixels, truth, depth, slopes(rays, road))
+    return given.part(seen), int(np.count_nonzero(~seen))
 
 
 def loaded(
