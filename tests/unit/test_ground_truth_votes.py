@@ -2,11 +2,19 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from card.artifacts import default_settings
 from card.geometry import Trajectory
+from card.ground_truth import visibility_votes as votes_module
+from card.ground_truth.block_grid import block_grid
 from card.ground_truth.icp_flow import FlowVotes, dynamic_by_flow, flow_residuals, flow_votes, scan_pairs
-from card.ground_truth.surface import local_planes
+from card.ground_truth.planes import PlaneRule, find_planes
+from card.ground_truth.rays import POSES, pose_times, ray_origins
+from card.ground_truth.reference.crossed import crossed_voxels
+from card.ground_truth.reference.surface import local_planes
+from card.ground_truth.reference.visibility_votes import visibility_votes as plain_votes
 from card.ground_truth.sweeps import Sweep
 from card.ground_truth.visibility_votes import (
     Votes,
@@ -15,7 +23,7 @@ from card.ground_truth.visibility_votes import (
     visibility_votes,
 )
 from card.ground_truth.voxel_map import build_voxel_map
-from card.ground_truth.voxels import VoxelGrid, find, unpack
+from card.ground_truth.voxels import VoxelGrid, find, pack, unpack
 
 SETTINGS = default_settings("ground_truth")
 GRID = VoxelGrid.around(Trajectory([0, 1], np.zeros((2, 3)), [[1, 0, 0, 0]] * 2), 0.1)
@@ -77,8 +85,11 @@ def brute_votes(drive, voxels, chosen, surface) -> np.ndarray:
                 votes[0, k] += 1
                 continue
             t = (c - drive.origins[i]) @ d.T
+            with np.errstate(divide="ignore"):
+                faces = [(np.floor(c / 0.1) * 0.1 + f - drive.origins[i]) / d for f in (1e-7, 0.1 - 1e-7)]
+            crosses = np.minimum(*faces).max(axis=1) <= np.maximum(*faces).min(axis=1)
             aside = np.linalg.norm(c - drive.origins[i] - t[:, None] * d, axis=1)
-            passing = (aside <= 0.06) & (t >= 1) & (t <= 50) & (lengths - t >= 0.1)
+            passing = crosses & (aside <= 0.06) & (t >= 1) & (t <= 50) & (lengths - t >= 0.1)
             if not passing.any():
                 continue
             if (reach <= 2).any():
@@ -91,16 +102,142 @@ def brute_votes(drive, voxels, chosen, surface) -> np.ndarray:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_votes_equal_a_search_over_all_rays_and_voxels(seed):
+def test_plain_votes_equal_a_search_over_all_rays_and_voxels(seed):
     drive = random_drive(seed)
     voxels = drive.map()
-    chosen = np.sort(np.random.default_rng(seed).choice(len(voxels.keys), 500, replace=False))
-    votes = visibility_votes(drive, range(5), voxels, chosen, SETTINGS)
+    every = plain_votes(drive, range(5), voxels, np.arange(len(voxels.keys)), SETTINGS)
+    rare = np.r_[np.flatnonzero(every.moved), np.flatnonzero(every.beside)[::8]]
+    chosen = np.union1d(rare, np.random.default_rng(seed).choice(len(voxels.keys), 150, replace=False))
+    votes = plain_votes(drive, range(5), voxels, chosen, SETTINGS)
     wanted = brute_votes(drive, voxels, chosen, local_planes(voxels, chosen, SETTINGS))
     assert votes.hits.tolist() == wanted[0].tolist()
     assert votes.beside.tolist() == wanted[1].tolist()
     assert votes.moved.tolist() == wanted[2].tolist()
     assert wanted.sum(axis=1).min() >= 3
+
+
+def assert_same_votes(drive, chosen=None, **changed) -> Votes:
+    voxels, filled = drive.map(), SETTINGS | changed
+    chosen = np.arange(len(voxels.keys)) if chosen is None else chosen
+    sweeps = range(len(drive.clouds))
+    votes = visibility_votes(drive, sweeps, voxels, chosen, filled)
+    plain = plain_votes(drive, sweeps, voxels, chosen, filled)
+    for name in ("hits", "beside", "moved"):
+        assert np.array_equal(getattr(votes, name), getattr(plain, name)), name
+    return votes
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("place", [(0, 0, 0), (-431.07, 12.3, -7.7)])
+def test_compiled_votes_are_the_plain_ones(seed, place, monkeypatch):
+    # Voxels are gathered anew every metre.
+    monkeypatch.setattr(votes_module, "_REACH_M", 1.0)
+    drive = random_drive(seed, 6)
+    drive.clouds = [cloud + place for cloud in drive.clouds]
+    drive.origins = drive.origins + place
+    votes = assert_same_votes(drive)
+    assert min(votes.hits.sum(), votes.beside.sum(), votes.moved.sum()) > 15
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"near_voxels": 1},
+        {"near_voxels": 4, "planar_min_voxels": 20},
+        {"pass_max_range_m": 5.0, "pass_min_range_m": 0.0},
+        {"pass_lateral_m": 0.02, "pass_beyond_m": 0.0, "moved_gap_m": 0.0},
+        {"planar_max_thickness_m": 1.0, "planar_min_ratio": 1.0},
+    ],
+)
+def test_compiled_votes_are_the_plain_ones_at_other_settings(changed):
+    assert_same_votes(random_drive(1), **changed)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    st.lists(st.tuples(*[st.integers(-8, 8)] * 3), min_size=1, max_size=30),
+    st.lists(st.tuples(*[st.integers(-2, 2)] * 3), min_size=3, max_size=3),
+    st.sampled_from([0.05, 0.1, 0.23]),
+)
+def test_compiled_votes_are_the_plain_ones_on_any_rays(points, places, pitch):
+    """Rays along axes and diagonals, through edges and corners of voxels, from faces."""
+    clouds = [np.array(points[k::3] or points, dtype=np.float64) * pitch * (1, 2, 1) for k in range(3)]
+    origins = np.array(places) * 0.05 + (0, -3, 0)
+    clouds = [c[np.linalg.norm(c - o, axis=1) > 0.1] for c, o in zip(clouds, origins, strict=True)]
+    drive = StandingDrive(clouds, origins, np.array([True, False, True]))
+    assert_same_votes(drive, pass_min_range_m=0.2, pass_lateral_m=0.09, moved_gap_m=0.1)
+
+
+@pytest.mark.parametrize("tilt", [0.0, 1e-17, -1e-16, 1e-13, -1e-11, 1e-9, -1e-7])
+def test_rays_along_a_face_are_walked_to_their_end(tilt):
+    """From a face, nearly along it: rounding may put the ray on either side."""
+    origin = np.array([12.8, -3.2, 0.8])
+    away = np.array([[tilt, 1.0, -tilt], [1.0, -tilt, tilt], [-tilt, tilt, -1.0], [0.7, 0.7, tilt]])
+    clouds = [origin + away * r for r in (30.0, 20.0, 6.0)]
+    drive = StandingDrive(clouds, np.tile(origin, (3, 1)), np.ones(3, bool))
+    assert_same_votes(drive)
+
+
+def test_no_voxels_and_no_points_get_no_votes():
+    drive = random_drive(0)
+    assert len(assert_same_votes(drive, np.empty(0, dtype=np.int64)).hits) == 0
+    drive.clouds[2] = np.empty((0, 3))
+    assert_same_votes(drive)
+
+
+def test_crossed_voxels_lie_side_by_side_along_the_ray():
+    origin, direction = np.array([0.5, 0.5, -0.5]), np.array([0.6, -0.8, 0.0])
+    crossed = crossed_voxels(origin, direction, 0.0, 5.0)
+    assert crossed[0].tolist() == [0, 0, -1]
+    assert crossed[-1].tolist() == [3, -4, -1]
+    assert (np.abs(np.diff(crossed, axis=0)).sum(axis=1) == 1).all()
+    assert len(crossed_voxels(origin, direction, 2.0, 1.0)) == 0
+
+
+def test_the_block_grid_finds_each_voxel():
+    indices = np.unique(np.random.default_rng(5).integers(1000, 1040, (3000, 3)), axis=0)
+    grid = block_grid(pack(indices), indices[:1] - 30)
+    for v, (x, y, z) in enumerate((indices - grid.low).tolist()):
+        b = grid.block[x >> 3, y >> 3, z >> 3]
+        assert grid.number[b, x & 7, (y & 7) * 8 + (z & 7)] == v
+        assert (grid.bounds[b, :3] <= (x & 7, y & 7, z & 7)).all()
+        assert (grid.bounds[b, 3:] >= (x & 7, y & 7, z & 7)).all()
+    assert (grid.number >= 0).sum() == len(indices)
+    assert sum(int(word).bit_count() for word in grid.bits.ravel()) == len(indices)
+    assert (indices[0] - 30 - grid.low).min() >= 8
+    assert (grid.block[[0, -1]] < 0).all()
+
+
+def test_pose_times_stay_within_the_sweep():
+    # A stamp of today needs 61 bits: through float64 the last time would lie beyond the end.
+    start, end = 1_776_157_200_013_000_001, 1_776_157_200_112_999_999
+    times = pose_times(start, end)
+    assert (times[0], times[-1], len(times)) == (start, end, POSES)
+    assert (np.diff(times) > 0).all()
+
+
+def test_rays_start_where_the_moving_sensor_was():
+    start, end = 1_776_157_200_000_000_000, 1_776_157_200_099_000_000
+    times = start + np.array([0, 33_000_001, 99_000_000])
+    path = Trajectory([start, end + 1], [[0, 0, 0], [1, 2, 0.0]], [[1, 0, 0, 0]] * 2)
+    drive = SimpleNamespace(start_ns=[start], end_ns=[end], poses=lambda i, t: path.at(t))
+    sweep = Sweep(np.ones((3, 3)), times, np.zeros(3, np.uint8), 0, 0)
+    assert ray_origins(drive, 0, sweep) == pytest.approx(path.at(times)[:, :3, 3], abs=1e-9)
+
+
+def test_compiled_planes_are_the_plain_ones():
+    voxels = random_drive(3).map()
+    chosen = np.arange(len(voxels.keys))
+    surface = local_planes(voxels, chosen, SETTINGS)
+    grid = block_grid(voxels.keys, unpack(voxels.keys[:1]))
+    normals, planar = np.empty((len(chosen), 3), np.float32), np.full(len(chosen), -1, np.int8)
+    wanted = chosen % 3 > 0
+    cells = unpack(voxels.keys) - grid.low
+    find_planes(grid, cells, voxels.centroids, 0.1, wanted, PlaneRule(2, 6, 0.035, 2.5), normals, planar)
+    assert np.array_equal(planar[wanted], surface.planar[wanted])
+    assert (planar[~wanted] == -1).all()
+    both = planar == 1
+    assert np.abs((normals * surface.normals)[both].sum(axis=1)) == pytest.approx(1, abs=1e-6)
 
 
 def test_planes_equal_a_loop_over_neighbours():

@@ -13,16 +13,20 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from card.ground_truth.rays import Passes, SweepRays, pose_times
-from card.ground_truth.surface import Surface, local_planes
+from card.ground_truth.block_grid import block_grid
+from card.ground_truth.pass_votes import PassRule, Region, sweep_votes
+from card.ground_truth.planes import PlaneRule, find_planes
+from card.ground_truth.rays import ray_origins
 from card.ground_truth.sweeps import Drive
 from card.ground_truth.voxel_map import VoxelMap
-from card.ground_truth.voxels import find, pack, unpack
+from card.ground_truth.voxels import pack, unpack
 
 Index = npt.NDArray[np.int64]
 
-#: Edge of the blocks, in voxels, by which voxels near a sweep are found.
-_BLOCK = 64
+#: Edge of the tiles, in voxels, by which voxels near a sweep are found.
+_TILE = 64
+#: How far a sensor may go before the voxels round it are gathered anew, m.
+_REACH_M = 20.0
 
 
 @dataclass(frozen=True)
@@ -54,48 +58,33 @@ def evidence_sweeps(drive: Drive, baseline: float, step: int) -> list[int]:
 def visibility_votes(
     drive: Drive, sweeps: Iterable[int], voxels: VoxelMap, chosen: Index, settings: Mapping[str, Any]
 ) -> Votes:
-    """Compare each evidence sweep with each chosen voxel (positions (C,) in the map) within range.
+    """Compare each evidence sweep with each chosen voxel (increasing positions (C,) in the map) in range.
 
-    With c the centroid of a voxel and n its normal, a sweep votes
-    - *hit* if one of its returns lies in the voxel;
-    - *beside* if a ray passes within `pass_lateral_m` of c and another return of the sweep lies in the cube
-      of 2 `near_voxels` + 1 voxels round it;
-    - *moved* if such a ray has no return near, its return q lies `moved_gap_m` or more behind c and, where
-      the voxel is planar, |n (q - c)| > `flow_residual_m` and |n d| > `planar_min_incidence`;
-    and otherwise nothing.
+    With c the centroid of a voxel, n its normal and d the direction of a ray that returns at q, the ray
+    *passes* the voxel if it crosses it and its point nearest to c lies within `pass_lateral_m` of c, between
+    `pass_min_range_m` and `pass_max_range_m` from the sensor and `pass_beyond_m` or more before q. A sweep
+    votes
+    - *hit* if one of its returns, no further away than `pass_max_range_m`, lies in the voxel;
+    - *beside* if a ray passes and another return of the sweep lies in the cube of 2 `near_voxels` + 1 voxels
+      round the voxel;
+    - *moved* if no return is near, a ray passes `moved_gap_m` or more before q and, where the voxel is planar
+      (`planes.find_planes`), |n (q - c)| > `flow_residual_m` and |n d| > `planar_min_incidence`;
+    and otherwise nothing. `reference.visibility_votes` is the same in plain numpy.
     """
-    keys = voxels.keys[chosen]
-    centroids = voxels.grid.corners(keys) + voxels.centroids[chosen]
-    surface = local_planes(voxels, chosen, settings)
-    blocks = _Blocks(keys)
-    votes = Votes(*(np.zeros(len(chosen), dtype=np.int32) for _ in range(3)))
+    rules = _rules(settings)
+    votes = np.zeros((len(chosen), 3), dtype=np.int32)
+    tiles = _Tiles(voxels)
+    region, centre = None, np.full(3, np.inf)
     for i in sweeps:
         sweep = drive.sweep(i)
         if not len(sweep.points):
             continue
-        occupied = np.unique(voxels.grid.keys(sweep.points))
-        hit = find(keys, occupied)
-        hit = hit[hit >= 0]
-        votes.hits[hit] += 1
-        times = pose_times(int(drive.start_ns[i]), int(drive.end_ns[i]))
-        rays = SweepRays(sweep.points, sweep.time_ns, sweep.ring, times, drive.poses(i, times))
-        place = voxels.grid.indices(drive.origins[i : i + 1])[0]
-        local = blocks.within(place, settings["pass_max_range_m"] / voxels.grid.size)
-        local = local[~np.isin(local, hit)]
-        passes = rays.passing(
-            centroids[local],
-            settings["pass_lateral_m"],
-            settings["pass_min_range_m"],
-            settings["pass_max_range_m"],
-            settings["pass_beyond_m"],
-        )
-        passed = np.unique(passes.place)
-        near = _have_return_near(keys[local[passed]], occupied, settings["near_voxels"])
-        votes.beside[local[passed[near]]] += 1
-        contradicts = _contradicts(passes, local, surface, settings)
-        moved = np.setdiff1d(passes.place[contradicts], passed[near])
-        votes.moved[local[moved]] += 1
-    return votes
+        origins = ray_origins(drive, i, sweep)
+        if region is None or np.linalg.norm(origins - centre, axis=1).max() > _REACH_M:
+            centre = drive.origins[i]
+            region = _region(voxels, chosen, tiles, centre, rules)
+        sweep_votes(i, sweep.points, origins, voxels.grid.size, region, rules[0], votes)
+    return Votes(*votes.T)
 
 
 def dynamic_by_visibility(
@@ -112,41 +101,73 @@ def dynamic_by_visibility(
     return (votes.moved >= settings["moved_votes"]) & (share >= limit)
 
 
-def _contradicts(
-    passes: Passes, local: Index, surface: Surface, settings: Mapping[str, Any]
-) -> npt.NDArray[np.bool_]:
-    """Passes (K,) that a surface at the place would have stopped, and clearly so."""
-    normals, planar = surface.normals[local[passes.place]], surface.planar[local[passes.place]]
-    incidence = np.abs(np.einsum("ki,ki->k", normals, passes.direction))
-    offset = np.abs(np.einsum("ki,ki->k", normals, passes.gap))
-    clear = (offset > settings["flow_residual_m"]) & (incidence > settings["planar_min_incidence"])
-    return (passes.beyond >= settings["moved_gap_m"]) & (~planar | clear)
+def _rules(settings: Mapping[str, Any]) -> tuple[PassRule, PlaneRule]:
+    passes = PassRule(
+        nearest_m=float(settings["pass_min_range_m"]),
+        furthest_m=float(settings["pass_max_range_m"]),
+        lateral_m=float(settings["pass_lateral_m"]),
+        beyond_m=float(settings["pass_beyond_m"]),
+        near_voxels=settings["near_voxels"],
+        gap_m=float(settings["moved_gap_m"]),
+        residual_m=float(settings["flow_residual_m"]),
+        incidence=float(settings["planar_min_incidence"]),
+    )
+    planes = PlaneRule(
+        near_voxels=settings["near_voxels"],
+        min_voxels=settings["planar_min_voxels"],
+        max_thickness_m=float(settings["planar_max_thickness_m"]),
+        min_ratio=float(settings["planar_min_ratio"]),
+    )
+    return passes, planes
 
 
-def _have_return_near(keys: Index, occupied: Index, radius: int) -> npt.NDArray[np.bool_]:
-    """Whether a key of `occupied` lies in the cube of 2 radius + 1 voxels round each of `keys` (K,)."""
-    from scipy.spatial import cKDTree
+def _region(
+    voxels: VoxelMap,
+    chosen: Index,
+    tiles: _Tiles,
+    centre: npt.NDArray[np.float64],
+    rules: tuple[PassRule, PlaneRule],
+) -> Region:
+    """All voxels that sweeps within `_REACH_M` of `centre` can say something about, and their neighbours."""
+    passes, planes = rules
+    size = voxels.grid.size
+    index = voxels.grid.indices(centre[None])
+    reach = int(np.ceil(_REACH_M / size)) + 8
+    radius = reach + passes.furthest_m / size
+    near = tiles.within(index[0], radius + 2 * planes.near_voxels)
+    grid = block_grid(voxels.keys[near], np.concatenate([index - reach, index + reach]))
+    at = np.minimum(np.searchsorted(chosen, near), max(len(chosen) - 1, 0))
+    wanted = chosen[at] == near if len(chosen) else np.zeros(len(near), dtype=np.bool_)
+    offsets = voxels.centroids[near]
+    cells = unpack(voxels.keys[near]) - grid.low
+    normals = np.zeros((len(near), 3), dtype=np.float32)
+    planar = np.zeros(len(near), dtype=np.int8)
+    find_planes(grid, cells, offsets, size, wanted, planes, normals, planar)
+    return Region(
+        grid=grid,
+        world=grid.low + np.array(voxels.grid.first),
+        offsets=offsets,
+        chosen=np.where(wanted, at, -1),
+        normals=normals,
+        planar=planar,
+        returns=np.zeros_like(grid.bits),
+        known=np.full(len(near), -1, dtype=np.int64),
+    )
 
-    if not len(keys):
-        return np.zeros(0, dtype=np.bool_)
-    tree = cKDTree(unpack(occupied))
-    distance, _ = tree.query(unpack(keys), p=np.inf, distance_upper_bound=radius + 0.5)
-    return np.isfinite(distance)
 
+class _Tiles:
+    """Voxels by coarse tile, so that a sweep does not look at the whole drive."""
 
-class _Blocks:
-    """Voxels by coarse block, so that a sweep does not look at the whole drive."""
-
-    def __init__(self, keys: Index) -> None:
-        block = pack(unpack(keys) // _BLOCK)
-        self._order = np.argsort(block, kind="stable")
-        self._keys, self._starts = np.unique(block[self._order], return_index=True)
-        self._ends = np.r_[self._starts[1:], len(keys)]
+    def __init__(self, voxels: VoxelMap) -> None:
+        tile = pack(unpack(voxels.keys) // _TILE)
+        self._order = np.argsort(tile, kind="stable")
+        self._keys, self._starts = np.unique(tile[self._order], return_index=True)
+        self._ends = np.r_[self._starts[1:], len(tile)]
 
     def within(self, index: Index, radius: float) -> Index:
-        """Increasing positions of all voxels within `radius` voxels of a voxel index (3,), and some more."""
-        centres = (unpack(self._keys) + 0.5) * _BLOCK
-        away = np.maximum(np.abs(centres - index) - _BLOCK / 2 - 1, 0)
+        """Positions of all voxels within `radius` voxels of a voxel index (3,), and some more."""
+        centres = (unpack(self._keys) + 0.5) * _TILE
+        away = np.maximum(np.abs(centres - index) - _TILE / 2 - 1, 0)
         near = np.flatnonzero((away**2).sum(axis=1) <= radius**2)
-        parts = [self._order[self._starts[b] : self._ends[b]] for b in near]
-        return np.sort(np.concatenate(parts)) if parts else np.empty(0, dtype=np.int64)
+        parts = [self._order[self._starts[t] : self._ends[t]] for t in near]
+        return np.concatenate([np.empty(0, dtype=np.int64), *parts])

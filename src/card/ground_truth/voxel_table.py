@@ -1,4 +1,4 @@
-"""Compiled: a hash table of voxels that takes a burst at a time."""
+"""A hash table of voxels that takes a burst at a time."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
+from card.ground_truth.compiled import compiled
 from card.ground_truth.voxels import AXIS_BITS, OFFSET_STEPS
 
 Floats = npt.NDArray[np.float64]
@@ -38,7 +38,7 @@ assert VOXEL.itemsize == 64, VOXEL.itemsize
 _HASH = np.uint64(0x9E3779B97F4A7C15)
 
 
-@njit(cache=True)
+@compiled
 def add_burst(
     points: Floats,
     burst: int,
@@ -98,7 +98,7 @@ def add_burst(
     return -1
 
 
-@njit(cache=True)
+@compiled
 def _see(v: Any, burst: int, front: bool, origins: Floats, spacing: float, views: Ints, used: Index) -> None:
     """Accept a viewpoint of a LiDAR that is far enough from all before it; front views span a baseline."""
     earliest = v.front if front else v.rear
@@ -132,13 +132,13 @@ def _see(v: Any, burst: int, front: bool, origins: Floats, spacing: float, views
         v.rear_views += 1
 
 
-@njit(cache=True)
+@compiled
 def _apart(origins: Floats, a: int, b: int) -> Any:
     x, y, z = origins[a, 0] - origins[b, 0], origins[a, 1] - origins[b, 1], origins[a, 2] - origins[b, 2]
     return np.sqrt(x * x + y * y + z * z)
 
 
-@njit(cache=True)
+@compiled
 def _slot(key: int, voxels: Voxels, slots: Ints) -> Any:
     """Where `key` is, or belongs, in a table whose length is a power of two."""
     mask = len(slots) - 1
@@ -148,14 +148,14 @@ def _slot(key: int, voxels: Voxels, slots: Ints) -> Any:
     return slot
 
 
-@njit(cache=True)
+@compiled
 def index(voxels: Voxels, count: int, slots: Ints) -> None:
     """Enter the first `count` voxels into an empty table."""
     for at in range(count):
         slots[_slot(voxels[at].key, voxels, slots)] = at
 
 
-@njit(cache=True)
+@compiled
 def permute(voxels: Voxels, order: Index) -> None:
     """voxels[:] = voxels[order] without a second copy; `order` (V,) is used up."""
     for start in range(len(order)):

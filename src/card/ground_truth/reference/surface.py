@@ -1,4 +1,4 @@
-"""Local planes of the voxel map: which voxels lie on a smooth surface, and its normal."""
+"""Local planes of the voxel map in plain numpy; see `ground_truth.planes`."""
 
 from __future__ import annotations
 
@@ -27,9 +27,7 @@ class Surface:
 def local_planes(voxels: VoxelMap, chosen: npt.NDArray[np.int64], settings: Mapping[str, Any]) -> Surface:
     """The plane through the means of the voxels round each chosen one (positions (C,) in the map).
 
-    The neighbourhood is a cube of 2 `near_voxels` + 1 voxels; each occupied voxel weighs the same. With the
-    standard deviations s0 <= s1 <= s2 along the principal axes, a voxel is planar if the cube holds
-    `planar_min_voxels` or more, s0 < `planar_max_thickness_m` and s1 > `planar_min_ratio` s0.
+    `ground_truth.planes.find_planes` says what makes a voxel planar.
     """
     parts = [
         _planes(voxels, chosen[at : at + CHUNK], settings) for at in range(0, max(len(chosen), 1), CHUNK)
@@ -67,7 +65,7 @@ def _moments(
             at = np.minimum(first + step, len(keys) - 1)
             dz = keys[at] - low
             here = np.flatnonzero((first + step < len(keys)) & (dz <= 2 * radius))
-            neighbour = voxels.centroids[at[here]]
+            neighbour = voxels.centroids[at[here]].astype(np.float64)
             x = neighbour[:, 0] + dx * size
             y = neighbour[:, 1] + dy * size
             z = neighbour[:, 2] + (dz[here] - radius) * size
