@@ -6,6 +6,7 @@
 #   snakemake benchmark --cores 2         evaluate predictions on the release
 #   snakemake proposals --cores 2         let your detector propose labels, and compare them with the reviewed ones
 #   snakemake label_consistency --cores 2   how well that detector repeats the labels
+#   snakemake upload --cores 2            what an upload would do; with --config send=true do it
 #   snakemake assign_splits --cores 2     give new sequences their rows in the splits ledger
 from snakemake.utils import min_version
 
@@ -29,6 +30,7 @@ include: "workflow/rules/irregularities.smk"
 include: "workflow/rules/proposals.smk"
 include: "workflow/rules/splits.smk"
 include: "workflow/rules/packaging.smk"
+include: "workflow/rules/upload.smk"
 include: "workflow/rules/report.smk"
 include: "workflow/rules/benchmark.smk"
 

@@ -12,6 +12,7 @@ from card.errors import CardError
 COMMANDS = (
     "card.packaging.commands.verify",
     "card.packaging.commands.extract",
+    "card.packaging.commands.upload",
     "card.splits.command",
     "card.benchmark.command",
     "card.simulation.command",

@@ -124,6 +124,7 @@ def assemble(
             sequences=rows,
             terms=terms,
             about=settings["release"],
+            gate=None if settings["hub"]["gated"] == "none" else settings["hub"]["gate_text"],
             splits=read_json(split_report, "report") if split_report else None,
             has_mini=bool(mini["frame"]),
         )

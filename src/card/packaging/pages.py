@@ -23,7 +23,8 @@ def write_pages(
     release: Mapping[str, Any],
     sequences: Sequence[Mapping[str, Any]],
     terms: Mapping[str, Any],
-    about: Mapping[str, str],
+    about: Mapping[str, Any],
+    gate: str | None,
     splits: Mapping[str, Any] | None,
     has_mini: bool,
 ) -> None:
@@ -34,7 +35,8 @@ def write_pages(
     templates : folder `release/`.
     release : document `release`; sequences : rows of the sequence table.
     terms : the licence's entry of `config/licenses.yaml`.
-    about : title, creator, contact and url from the settings.
+    about : title, creator, authors, contact and url from the settings.
+    gate : what readers of a gated repository agree to, None for an open one.
     splits : report of the stage `split_report`, None without frames.
     has_mini : whether `mini.parquet` has rows.
     """
@@ -51,7 +53,12 @@ def write_pages(
         "commercial": "Commercial use is permitted."
         if terms["commercial"]
         else "Commercial use is not permitted.",
-        "front_matter": yaml.safe_dump(front_matter(release, about["title"], has_mini), sort_keys=False),
+        "front_matter": yaml.safe_dump(
+            front_matter(release, about["title"], has_mini) | ({"extra_gated_prompt": gate} if gate else {}),
+            sort_keys=False,
+            allow_unicode=True,
+        ),
+        "authors": yaml.safe_dump([{"name": name} for name in about["authors"]], allow_unicode=True),
         "example_split": next((split for split in SPLITS if release["frames"][split]), SPLITS[0]),
         "counts": _counts(release, sequences),
         "split_table": _table(("split", "frames"), [(split, release["frames"][split]) for split in SPLITS]),
@@ -82,6 +89,12 @@ def write_pages(
     for name in COPIED:
         (tree / name).write_bytes((templates / name).read_bytes())
     (tree / "LICENSE").write_bytes((templates / "licenses" / terms["text"]).read_bytes())
+
+
+def front_matter_of(page: Path) -> dict[str, Any]:
+    """YAML that a dataset card opens with."""
+    found: dict[str, Any] = yaml.safe_load(page.read_text(encoding="utf-8").split("---\n", 2)[1])
+    return found
 
 
 def front_matter(release: Mapping[str, Any], title: str, has_mini: bool) -> dict[str, Any]:
