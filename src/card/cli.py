@@ -13,12 +13,14 @@ COMMANDS = (
     "card.packaging.commands.verify",
     "card.packaging.commands.extract",
     "card.packaging.commands.upload",
+    "card.packaging.commands.takedown",
+    "card.packaging.commands.diff",
     "card.splits.command",
     "card.benchmark.command",
     "card.simulation.command",
     "card.annotations.command",
 )
-"""Modules of one command each, with `add`, which adds it to the parser."""
+"""Modules with `add`, which adds a command to the parser."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

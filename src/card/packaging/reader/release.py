@@ -87,6 +87,11 @@ class Release:
             )
         return content
 
+    def retractions(self) -> list[dict[str, Any]]:
+        """Rows of what was taken out of earlier versions."""
+        rows: list[dict[str, Any]] = self._table("metadata/retractions.parquet", "retractions").to_pylist()
+        return rows
+
     def names(self) -> list[tuple[Key, str]]:
         """(sequence, modality, frame or burst) and name of all files in the shards, in their order there."""
         return [(key, member[0]) for key, member in self._members.items()]
