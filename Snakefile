@@ -39,6 +39,7 @@ rule release:
     default_target: True
     input:
         validations(),
+        rules.firewall.output,
         rules.split_lists.output,
         simulated_days(),
 

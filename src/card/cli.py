@@ -15,6 +15,7 @@ COMMANDS = (
     "card.packaging.commands.upload",
     "card.packaging.commands.takedown",
     "card.packaging.commands.diff",
+    "card.packaging.commands.firewall",
     "card.splits.command",
     "card.benchmark.command",
     "card.simulation.command",

@@ -58,7 +58,7 @@ def write_drive(work: Path, row: dict[str, Any], seed: int = 0) -> dict[str, Any
     rng = np.random.default_rng(seed)
     results, recording = work / "results" / row["id"], work / "recordings" / row["id"]
     results.mkdir(parents=True)
-    times = [START_NS + i * STEP_NS for i in range(FRAMES)]
+    times = [START_NS + seed * 10**12 + i * STEP_NS for i in range(FRAMES)]
     _write_bursts(recording, results, times, rng)
     _write_images(recording, results, times, rng)
     _write_ground_truth(results, rng)

@@ -341,6 +341,6 @@ def test_the_error_tells_the_first_finding_and_the_number(valid: Path, tmp_path:
     shutil.copytree(valid, tree)
     (tree / "NOTICE").unlink()
     report = tmp_path / "validation.json"
-    with pytest.raises(CardError, match=r"release is not valid: NOTICE: missing and 1 more, see the log"):
+    with pytest.raises(CardError, match=r"release is not valid: NOTICE: missing and 2 more, see the log"):
         validate(tree, report=report, settings=SETTINGS)
     assert not report.exists()

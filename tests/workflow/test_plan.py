@@ -19,7 +19,8 @@ def chain(id: str, *stages: str) -> set[tuple[str, str]]:
 
 
 def tree(*repositories: str) -> set[tuple[str, str]]:
-    return {(rule, name) for name in repositories for rule in ("assemble", "validate_tree")}
+    pairs = {(rule, name) for name in repositories for rule in ("assemble", "validate_tree")}
+    return pairs | {("firewall", "")}
 
 
 def split_tree(*repositories: str) -> set[tuple[str, str]]:

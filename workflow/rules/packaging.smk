@@ -1,5 +1,5 @@
 # Needs: every artifact of a sequence with its report, never a raw image; the release templates; the splits.
-# Makes: results/{id}/package/, one whole tree a licence under results/release/, and its validation.
+# Makes: results/{id}/package/, one whole tree a licence under results/release/, its validation, the firewall's report.
 REPOSITORIES = {
     terms["repository"]: spdx for spdx, terms in LICENSES["licenses"].items()
 }
@@ -97,6 +97,21 @@ rule validate_tree:
         "../scripts/validate_tree.py"
 
 
+rule firewall:
+    input:
+        sums=tree_sums,
+    output:
+        report=f"{RELEASE}/firewall.report.json",
+    log:
+        "logs/release/firewall.log",
+    params:
+        cfg=LICENSES["countries"],
+        code=code("firewall"),
+    script:
+        "../scripts/firewall.py"
+
+
 rule validate:
     input:
         validations(),
+        rules.firewall.output,

@@ -264,6 +264,11 @@ def validations():
     return expand(rules.validate_tree.output.validation, repository=repositories)
 
 
+def tree_sums(wildcards):
+    repositories = [name for name in REPOSITORIES if in_tree(name) or not SUBSET]
+    return expand(rules.assemble.output.sums, repository=repositories)
+
+
 def report_inputs(wildcards):
     return [
         path

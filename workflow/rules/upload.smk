@@ -5,7 +5,8 @@
 rule upload:
     # What is on the Hub is no result of this machine: the rule makes no file and runs whenever it is asked for.
     input:
-        validations(),
+        trees=validations(),
+        firewall=rules.firewall.output,
     log:
         "logs/upload.log",
     params:

@@ -6,7 +6,7 @@ from card.artifacts import logged
 from card.packaging.upload import upload
 
 with logged(Path(snakemake.log[0])):
-    for validation in snakemake.input:
+    for validation in snakemake.input.trees:
         lines = upload(
             tree=Path(validation.removesuffix(".validation.json")),
             records=Path(snakemake.params.records),

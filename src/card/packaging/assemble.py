@@ -18,6 +18,7 @@ from card.artifacts import (
 )
 from card.errors import CardError
 from card.packaging.croissant import croissant
+from card.packaging.files_table import file_columns
 from card.packaging.metadata import write_metadata
 from card.packaging.mini import mini_columns
 from card.packaging.pages import write_pages
@@ -35,6 +36,7 @@ SHIPPED_SCHEMAS = (
     "provenance",
     "quality",
     "release",
+    "release_files",
     "release_frames",
     "release_members",
     "release_mini",
@@ -128,6 +130,9 @@ def assemble(
             splits=read_json(split_report, "report") if split_report else None,
             has_mini=bool(mini["frame"]),
         )
+        paths = [path.relative_to(tree).as_posix() for path in tree.rglob("*") if path.is_file()]
+        listed = file_columns(paths, document["sequences"], spdx)
+        write_table(tree / "metadata" / "files.parquet", listed, "release_files")
         hashes |= _hash_rest(tree, hashes)
         _write_sums(tree, hashes)
         difference = changes(before, read_records(tree))

@@ -15,6 +15,7 @@ from card.artifacts import (
     write_json,
     write_table,
 )
+from card.packaging.files_table import file_columns
 from card.packaging.reader import SPLITS, Release
 from card.packaging.reader.verify import SUMS, read_sums
 from card.packaging.shards import Source, write_shards
@@ -126,6 +127,9 @@ def _rewrite_tree(copy: Path, members: Rows, bad: set[str], whole: set[str], rel
         "bytes": sum(row["size"] for row in kept),
     }
     write_json(copy / "release.json", about, "release")
+    paths = [path.relative_to(copy).as_posix() for path in copy.rglob("*") if path.is_file()]
+    columns = file_columns(paths, about["sequences"], about["spdx"])
+    write_table(copy / "metadata/files.parquet", columns, "release_files")
     _write_sums(copy)
 
 

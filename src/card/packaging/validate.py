@@ -16,10 +16,19 @@ from card.packaging.checks.files import check_files
 from card.packaging.checks.geometry import check_geometry
 from card.packaging.checks.licenses import check_licenses
 from card.packaging.checks.members import check_members
+from card.packaging.checks.provenance import check_provenance
 from card.packaging.checks.splits import check_splits
 from card.packaging.checks.tables import check_tables
 
-CHECKS = (check_files, check_tables, check_members, check_geometry, check_licenses, check_card_page)
+CHECKS = (
+    check_files,
+    check_provenance,
+    check_tables,
+    check_members,
+    check_geometry,
+    check_licenses,
+    check_card_page,
+)
 logger = logging.getLogger("card")
 
 

@@ -36,6 +36,7 @@ class Contents:
     mini: list[Row] = field(default_factory=list)
     members: list[Row] = field(default_factory=list)
     retractions: list[Row] = field(default_factory=list)
+    files: list[Row] = field(default_factory=list)
     sidecars: dict[str, dict[str, Any]] = field(default_factory=dict)  # by sequence and file name
     findings: list[str] = field(default_factory=list)
 
@@ -68,6 +69,7 @@ def read_contents(tree: Path) -> Contents:
     contents.sequences = rows("metadata/sequences.parquet", "release_sequences")
     contents.members = rows("metadata/members.parquet", "release_members")
     contents.retractions = rows("metadata/retractions.parquet", "retractions")
+    contents.files = rows("metadata/files.parquet", "release_files")
     contents.mini = rows("mini/mini.parquet", "release_mini")
     for row in contents.sequences:
         folder = f"sequences/{row['sequence']}"

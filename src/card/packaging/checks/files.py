@@ -10,7 +10,7 @@ from card.packaging.reader import SPLITS
 REQUIRED = (
     "README.md", "LICENSE", "NOTICE", "CITATION.cff", "CHANGELOG.md", "CONVENTIONS.md", "TAKEDOWN.md",
     "croissant.json", "release.json", "changes.json", "SHA256SUMS", "metadata/sequences.parquet",
-    "metadata/members.parquet", "metadata/retractions.parquet", "mini/mini.parquet",
+    "metadata/members.parquet", "metadata/files.parquet", "metadata/retractions.parquet", "mini/mini.parquet",
     *(f"metadata/frames-{split}.parquet" for split in SPLITS),
 )  # fmt: skip
 LINE = re.compile(r"([0-9a-f]{64})  (\S.*)")
