@@ -223,10 +223,30 @@ def test_ground_is_not_bent_by_a_third_that_sticks_out():
     assert np.abs(fit_ground(bent).above(points)).max() < 1e-3
 
 
-def tracked(rows: list[tuple[int, str, float, float, float]], **more: float) -> list[int]:
+def tracked(rows: list[tuple[int, str, float, float, float]], spread: float = 0.0) -> list[int]:
     frames, names, x, y, distances = zip(*rows, strict=True)
-    limits = {"radius_m": 1.0, "radius_per_m": 0.05} | more
-    return track_boxes(frames, names, np.array([x, y]).T, np.array(distances), **limits).tolist()
+    spreads = np.full(len(rows), spread)
+    places = np.array([x, y]).T
+    return track_boxes(frames, names, places, np.array(distances), spreads, 1.0, 0.05).tolist()
+
+
+def test_parts_of_a_wide_bump_are_one():
+    rows = [(0, "positive", 0, 0, 5), (1, "positive", 3, 0, 5)]
+    assert tracked(rows) == [0, 1]
+    assert tracked(rows, spread=2.5) == [0, 0]
+
+
+def test_a_box_at_the_images_edge_is_not_judged_by_a_guessed_ground(tmp_path):
+    """Only the ground behind it is in sight: a crown and a slope would be guessed."""
+    near = label(0, "positive", (0.0, 8.0, 0.0), (3.0, 2.0))
+    write_drive(tmp_path, [near], frames=1)
+    rig = road_points(0)
+    in_view = apply(CAMERA_FROM_RIG, rig[rig[:, 1] > 7]).astype(np.float32)
+    write_arrays(tmp_path / "ground_truth" / "000000.npz", {"points": in_view}, "ground_truth_points")
+    (box,), (track,), _ = run(tmp_path)
+    assert (box["verdict"], box["elevation_m"]) == ("unknown", None)
+    assert box["points"] > 100
+    assert track["y"] == pytest.approx(8, abs=2)
 
 
 def test_two_things_in_one_frame_are_never_one():

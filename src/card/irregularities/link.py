@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -67,6 +68,7 @@ def link_irregularities(
         [row["class"] for row in rows],
         places[:, :2],
         distances,
+        np.array([profile.spread_m for profile in profiles]),
         settings["track_radius_m"],
         settings["track_radius_per_m"],
     )
@@ -132,7 +134,7 @@ class _Scene:
         edges = np.concatenate([centre - half, centre + half])
         profile = box_profile(view, edges, row["class"], self._settings)
         if profile.place is None:
-            return Profile(profile.points, place=self._on_level_ground(centre))
+            return replace(profile, place=self._on_level_ground(centre))
         return profile
 
     def _on_level_ground(self, pixel: Array) -> Array | None:

@@ -37,6 +37,7 @@ class Profile:
     height_max_m, height_min_m : over the road plane of the four wheel contacts. relief_m : their difference.
     elevation_m, depression_m : how far the surface rises and falls from the ground around the box.
     place : (3,) in rig, of what sticks out, or of the whole box. distance_m : from the rig's origin to it.
+    spread_m : half the length or width of what is at the place.
     """
 
     points: int
@@ -46,6 +47,7 @@ class Profile:
     elevation_m: float | None = None
     depression_m: float | None = None
     place: Array | None = None
+    spread_m: float = 0.0
     verdict: str = UNKNOWN
 
     @property
@@ -64,13 +66,16 @@ def box_profile(view: View, edges: Array, name: str, settings: Mapping[str, Any]
     inside = _within(view.pixels, edges)
     margin = settings["context"] * np.tile(edges[2:] - edges[:2], 2) * (-1, -1, 1, 1)
     around = _within(view.pixels, edges + margin) & ~inside
-    if inside.sum() < settings["min_points"] or around.sum() < settings["min_points"]:
+    rig = view.rig[inside]
+    if inside.sum() < settings["min_points"]:
         return Profile(int(inside.sum()))
-    deviation = fit_ground(view.rig[around]).above(view.rig[inside])
+    if around.sum() < settings["min_points"] or not _surrounded(rig, view.rig[around]):
+        return Profile(len(rig), place=np.median(rig, axis=0), spread_m=_spread(rig))
+    deviation = fit_ground(view.rig[around]).above(rig)
     surface = np.abs(deviation) <= settings["max_deviation_m"]
     if surface.sum() < settings["min_points"]:
         return Profile(int(surface.sum()))
-    deviation, rig = deviation[surface], view.rig[inside][surface]
+    deviation, rig = deviation[surface], rig[surface]
     tail = settings["tail_pct"]
     elevation, depression = np.percentile(deviation, 100 - tail), -np.percentile(deviation, tail)
     wanted, needed = (
@@ -78,8 +83,8 @@ def box_profile(view: View, edges: Array, name: str, settings: Mapping[str, Any]
         if name == "positive"
         else (depression, settings["min_depression_m"])
     )
-    sticking = SIGNS[name] * deviation >= wanted / 2
     found = wanted >= needed
+    shown = rig[SIGNS[name] * deviation >= wanted / 2] if found else rig
     height = view.height[inside][surface]
     known = bool(np.isfinite(height).all())
     return Profile(
@@ -89,10 +94,24 @@ def box_profile(view: View, edges: Array, name: str, settings: Mapping[str, Any]
         float(np.ptp(height)) if known else None,
         float(elevation),
         float(depression),
-        rig[sticking].mean(axis=0) if found else np.median(rig, axis=0),
+        shown.mean(axis=0) if found else np.median(rig, axis=0),
+        _spread(shown),
         AGREES if found else DOUBTFUL,
     )
 
 
 def _within(pixels: Array, edges: Array) -> Mask:
     return np.asarray(((pixels >= edges[:2]) & (pixels < edges[2:])).all(axis=1))
+
+
+def _surrounded(inside: Array, around: Array) -> bool:
+    """Whether the ground around reaches beyond the middle half of what is inside, so that none is guessed."""
+    low, high = np.percentile(inside[:, :2], (25, 75), axis=0)
+    least, most = np.percentile(around[:, :2], (2, 98), axis=0)
+    return bool((least <= low).all() and (most >= high).all())
+
+
+def _spread(points: Array) -> float:
+    """Half the longer horizontal side of points (N, 3), metres, but for a tenth of them."""
+    low, high = np.percentile(points[:, :2], (5, 95), axis=0)
+    return float((high - low).max() / 2)

@@ -11,38 +11,40 @@ def track_boxes(
     names: Sequence[str],
     places: NDArray[np.float64],
     distances: NDArray[np.float64],
+    spreads: NDArray[np.float64],
     radius_m: float,
     radius_per_m: float,
 ) -> NDArray[np.int64]:
     """Track (N,) of each box, numbered from 0 in the order of first frames; -1 without a place.
 
     A box joins the nearest track of its class that has no box in its frame and lies within ``radius_m`` plus
-    ``radius_per_m`` a metre of distance: a place is the less sure the farther it was seen from. The nearest
-    sight of each irregularity comes first and gives its track the place.
+    ``radius_per_m`` a metre of distance plus half the extent of what was seen: a place is the less sure the
+    farther it was seen from, and the middle of a part of a bump is not that of the whole. The nearest sight
+    of each irregularity comes first and gives its track the place.
 
     Parameters
     ----------
     frames, names : (N,) frame and class of each box. places : (N, 2) world, metres; NaN without one.
-    distances : (N,) metres from which each was seen.
+    distances, spreads : (N,) metres: from where each was seen, and half its extent.
     """
     found = np.full(len(frames), -1, dtype=np.int64)
-    tracks: list[tuple[str, NDArray[np.float64], set[int]]] = []
+    tracks: list[tuple[int, set[int]]] = []
     order = [i for i in np.argsort(distances, kind="stable").tolist() if np.isfinite(places[i]).all()]
     for box in order:
-        reach = radius_m + radius_per_m * distances[box]
-        gaps = [
-            float(np.hypot(*(place - places[box])))
-            if name == names[box] and frames[box] not in seen
+        # How far each track is from what was seen, in metres.
+        beyond = [
+            float(np.hypot(*(places[first] - places[box]))) - max(spreads[first], spreads[box])
+            if names[first] == names[box] and frames[box] not in seen
             else np.inf
-            for name, place, seen in tracks
+            for first, seen in tracks
         ]
-        nearest = int(np.argmin(gaps)) if gaps else -1
-        if gaps and gaps[nearest] <= reach:
+        nearest = int(np.argmin(beyond)) if beyond else -1
+        if beyond and beyond[nearest] <= radius_m + radius_per_m * distances[box]:
             found[box] = nearest
-            tracks[nearest][2].add(frames[box])
+            tracks[nearest][1].add(frames[box])
         else:
             found[box] = len(tracks)
-            tracks.append((names[box], places[box], {frames[box]}))
+            tracks.append((box, {frames[box]}))
     return _in_order_of_time(found)
 
 
