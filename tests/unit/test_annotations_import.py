@@ -87,6 +87,12 @@ def test_three_states_and_boxes_by_frame(drive):
         "off_road": 0,
     }
     assert report["gates"][0]["verdict"] == "pass"
+    statistics = {figure["name"]: figure["value"] for figure in report["figures"]}
+    assert statistics["boxes_per_frame"] == 2
+    assert (statistics["box_width_px"], statistics["box_height_px"]) == (
+        pytest.approx(10),
+        pytest.approx(16),
+    )
 
 
 def test_nobody_labelled_yet(drive):

@@ -11,6 +11,7 @@ from card.artifacts import default_settings, read_json, read_table, write_arrays
 from card.geometry import CameraModel, Trajectory, apply, from_json, inverse
 from card.irregularities.ground import fit_ground
 from card.irregularities.link import link_irregularities
+from card.irregularities.profile import View, box_profile
 from card.irregularities.tracks import track_boxes
 from card.simulation.calibrations import true_calibration
 
@@ -247,6 +248,21 @@ def test_a_box_at_the_images_edge_is_not_judged_by_a_guessed_ground(tmp_path):
     assert (box["verdict"], box["elevation_m"]) == ("unknown", None)
     assert box["points"] > 100
     assert track["y"] == pytest.approx(8, abs=2)
+
+
+@pytest.mark.parametrize(("share", "verdict"), [(0.0, "agrees"), (0.03, "agrees"), (0.3, "unknown")])
+def test_a_box_with_something_else_on_the_road_is_not_judged(share, verdict):
+    """A bump of 6 cm, seen straight from above, on a share of which something half a metre high stands."""
+    rng = np.random.default_rng(3)
+    rig = rng.uniform((-4, 5, 0), (4, 13, 0), (20_000, 3))
+    on_bump = (np.abs(rig[:, 0]) < 2) & (np.abs(rig[:, 1] - 9) < 2)
+    rig[on_bump, 2] += 0.06
+    rig[on_bump & (rng.uniform(size=len(rig)) < share), 2] += 0.5
+    view = View(rig[:, :2], rig, rig[:, 2])
+    profile = box_profile(view, np.array([-2.0, 7.0, 2.0, 11.0]), "positive", SETTINGS)
+    assert profile.verdict == verdict
+    assert profile.elevation_m == (pytest.approx(0.06, abs=1e-3) if verdict == "agrees" else None)
+    assert profile.place == pytest.approx([0, 9, 0.06], abs=0.1)
 
 
 def test_two_things_in_one_frame_are_never_one():

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from card.report.excitation import Contact, excitation
+from card.report.labels import coverage
 from card.report.map import highest_in_cells
 from card.report.numbers import distance, duration, number, size
 
@@ -33,6 +34,11 @@ def test_the_map_shows_the_highest_voxel_of_a_cell() -> None:
     voxels = np.array([[0.1, 0.1, 1.0], [0.2, 0.3, 5.0], [1.6, 0.2, -2.0], [9.0, 9.0, 1.0]])
     top = highest_in_cells(voxels, np.zeros(2), 0.5, (2, 4))
     np.testing.assert_array_equal(top, [[5.0, np.nan, np.nan, -2.0], [np.nan] * 4])
+
+
+def test_the_heat_map_counts_the_boxes_over_each_cell() -> None:
+    edges = np.array([[0.0, 0.0, 0.5, 1.0], [0.25, 0.5, 1.0, 1.0]])
+    np.testing.assert_array_equal(coverage(edges, (2, 4)), [[1, 1, 0, 0], [1, 2, 1, 1]])
 
 
 def test_numbers_read_well() -> None:

@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 from schema_rows import columns
 
-from card.artifacts import write_arrays, write_json, write_table
+from card.artifacts import write_arrays, write_json, write_report, write_table
 from card.geometry import CameraModel, Trajectory, apply, from_json, inverse, transform
 from card.report import page
 from card.simulation.calibrations import true_calibration
@@ -40,6 +40,7 @@ FULL = {
     ),
     "wheels": stage(),
     "privacy": stage(),
+    "annotations": stage(),
 }
 
 
@@ -112,6 +113,30 @@ def write_sequence(folder: Path, stages: dict[str, Any]) -> None:
         }
     document = {"schema": "wheel_excitation", "wheels": wheels}
     write_json(folder / "wheel_excitation.json", document, "wheel_excitation")
+    write_labels(folder)
+
+
+def write_labels(folder: Path) -> None:
+    """One box of the bump in each frame, which agrees with the ground truth, and one of nothing."""
+    size = {"camera_left_width_px": CAMERA.width, "camera_left_height_px": CAMERA.height}
+    write_report(folder / "ingest.report.json", stage="ingest", settings={}, inputs={}, counts=size)
+    bump = {"class": "positive", "x_center": 0.5, "y_center": 0.7, "width": 0.6, "height": 0.1}
+    nothing = {"class": "negative", "x_center": 0.2, "y_center": 0.9, "width": 0.05, "height": 0.1}
+    boxes = [{"frame": frame} | box for frame in range(3) for box in (bump, nothing)]
+    write_table(folder / "labels.parquet", columns("labels", boxes), "labels")
+    judged = {"elevation_m": 0.07, "depression_m": 0.0, "distance_m": 12.0}
+    found = [
+        {"frame": box["frame"], "class": box["class"], **(judged if box["class"] == "positive" else {})}
+        for box in boxes
+    ]
+    write_table(folder / "irregularities.parquet", columns("irregularities", found), "irregularities")
+    track = {"class": "positive", "x": 4.0, "y": 30.0, "z": 0.0, "boxes": 3}
+    write_table(
+        folder / "irregularity_tracks.parquet", columns("irregularity_tracks", [track]), "irregularity_tracks"
+    )
+    notes = ["frame 1, x 0.200, y 0.900 (track 1): negative without depression: +0.1 cm, -0.2 cm"]
+    path = folder / "irregularities.report.json"
+    write_report(path, stage="irregularities", settings={}, inputs={}, counts={"boxes": 6}, notes=notes)
 
 
 SHEET = {
@@ -171,7 +196,8 @@ def html(work: Path) -> str:
 def test_the_page_asks_no_host_and_holds_its_figures(work: Path, html: str) -> None:
     assert not re.search(r"https?://|<script|<link|url\(", html)
     names = [path.name for path in sorted((work / "report" / "figures").iterdir())]
-    assert names == [f"full_drive-{name}.png" for name in ("density", "excitation", "map", "overlay")]
+    drawn = ("density", "excitation", "labels", "map", "overlay")
+    assert names == [f"full_drive-{name}.png" for name in drawn]
     assert html.count("data:image/png;base64,") == len(names)
 
 
@@ -188,6 +214,7 @@ def test_every_figure_stands_beside_its_verdict(html: str) -> None:
     assert rows["rms not stated"][5] == "overridden rain (A. B.)"
     assert "Gates: 1 pass, 1 fail, 1 overridden." in html
     assert "The clock jumps once." in html
+    assert "negative without depression" in html
 
 
 def split(row: str) -> list[str]:

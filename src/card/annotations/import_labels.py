@@ -4,6 +4,7 @@ import logging
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 from card.annotations.boxes import Box, Rules
@@ -83,7 +84,8 @@ def import_labels(
                 100 * (1 - tally[NOT_REVIEWED] / len(states)) if states else None,
                 "%",
                 "Share of the frames that a person has looked at.",
-            )
+            ),
+            *_statistics([box for _, box in rows], tally[BOXES], expected.rules.size),
         ],
         gates=gates,
         notes=notes,
@@ -129,6 +131,24 @@ def label_columns(rows: Sequence[tuple[int, Box]]) -> dict[str, list[Any]]:
     for name in ("x_center", "y_center", "width", "height"):
         columns[name] = [getattr(box, name) for _, box in rows]
     return columns
+
+
+def _statistics(boxes: Sequence[Box], frames: int, size: tuple[int, int]) -> list[Figure]:
+    """Of the boxes in so many frames with any."""
+    figures = [
+        Figure(
+            "boxes_per_frame",
+            len(boxes) / frames if frames else None,
+            "1",
+            "Boxes in a frame that has any, in the mean.",
+        )
+    ]
+    for side, pixels in zip(SIDES, size, strict=True):
+        values = [getattr(box, side) * pixels for box in boxes]
+        figures.append(
+            Figure(f"box_{side}_px", median(values) if values else None, "px", f"Median {side} of a box.")
+        )
+    return figures
 
 
 def _raise_errors(found: Sequence[Issue], annotations: Path) -> None:

@@ -73,10 +73,11 @@ def box_profile(view: View, edges: Array, name: str, settings: Mapping[str, Any]
         return Profile(len(rig), place=np.median(rig, axis=0), spread_m=_spread(rig))
     deviation = fit_ground(view.rig[around]).above(rig)
     surface = np.abs(deviation) <= settings["max_deviation_m"]
-    if surface.sum() < settings["min_points"]:
-        return Profile(int(surface.sum()))
-    deviation, rig = deviation[surface], rig[surface]
     tail = settings["tail_pct"]
+    if surface.sum() < settings["min_points"] or 100 * (~surface).mean() > tail:
+        # Something stands on the road there, or the ground around is none.
+        return Profile(int(surface.sum()), place=np.median(rig, axis=0), spread_m=_spread(rig))
+    deviation, rig = deviation[surface], rig[surface]
     elevation, depression = np.percentile(deviation, 100 - tail), -np.percentile(deviation, tail)
     wanted, needed = (
         (elevation, settings["min_elevation_m"])

@@ -1,5 +1,6 @@
 """The drive from above: its track over the static voxels, coloured by their height over the road."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +9,7 @@ from numpy.typing import NDArray
 
 from card.artifacts.figures import INK, bare, figure
 from card.geometry import Trajectory
+from card.report.labels import COLORS, MARKERS
 
 Array = NDArray[np.float64]
 
@@ -25,6 +27,7 @@ def draw_map(
     rig_height_m: float,
     voxels: Array | None,
     camera_t_ns: NDArray[np.int64],
+    irregularities: Mapping[str, Array],
 ) -> None:
     """Draw track, start and the stretch the cameras saw; a drive that is long in Y lies on its side.
 
@@ -33,6 +36,7 @@ def draw_map(
     rig_height_m : height of the rig's origin over the road.
     voxels : (V, 3) centres of the static voxels in world, m; None where there is no map.
     camera_t_ns : (F,) times of the left images; may be empty.
+    irregularities : (I, 3) places in world of each class, m.
     """
     turn = _lying(trajectory.translation_m)
     track = trajectory.translation_m @ turn.T
@@ -47,10 +51,14 @@ def draw_map(
         seen = trajectory.at(known)[:, :3, 3] @ turn.T
         axes.plot(*seen[:, :2].T, color=TRACK, linewidth=3.2, solid_capstyle="round", label="with images")
         axes.plot(*track[0, :2], "o", color=TRACK, markersize=5, markeredgecolor="white", label="start")
+        for name, places in irregularities.items():
+            x, y = (places @ turn.T)[:, :2].T
+            look = {"color": COLORS[name], "markersize": 6, "markeredgecolor": "white", "linestyle": "none"}
+            axes.plot(x, y, MARKERS[name], label=f"{name} ({len(places)})", **look)
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
         bare(axes)
         _scale_bar(axes, low, extent)
-        drawing.legend(loc="outside upper left", ncols=3, handlelength=1.4)
+        drawing.legend(loc="outside upper left", ncols=5, handlelength=1.4)
 
 
 def highest_in_cells(voxels: Array, low: Array, cell_m: float, shape: tuple[int, int]) -> Array:

@@ -27,7 +27,11 @@ CHAIN = (
     "privacy",
     "annotations",
 )
-LATER_STAGES = {"splits": "splits.report.json", "packaging": "package.report.json"}
+LATER_STAGES = {
+    "irregularities": "irregularities.report.json",
+    "splits": "splits.report.json",
+    "packaging": "package.report.json",
+}
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from card.artifacts import read_arrays, read_json, read_table
 from card.geometry import CameraModel, Trajectory, from_json, transform
 from card.report.density import draw_density
 from card.report.excitation import Contact, draw_excitation
+from card.report.labels import COLORS, Labels, draw_labels
 from card.report.map import draw_map
 from card.report.overlay import draw_overlay
 
@@ -85,6 +86,44 @@ def _map(folder: Path, stages: Collection[str], out: Path) -> None:
         -float(np.mean([wheel["contact_m"][2] for wheel in wheels])),
         voxels,
         read_table(folder / "frames.parquet", "frames")["t_ns"].to_numpy(),
+        _places(folder) if "irregularities" in stages else {},
+    )
+
+
+def _places(folder: Path) -> dict[str, Any]:
+    rows = read_table(folder / "irregularity_tracks.parquet", "irregularity_tracks").to_pylist()
+    places = {
+        name: np.array([[row[axis] for axis in "xyz"] for row in rows if row["class"] == name])
+        for name in COLORS
+    }
+    return {name: place for name, place in places.items() if len(place)}
+
+
+def _labels(folder: Path, stages: Collection[str], out: Path) -> None:
+    boxes = read_table(folder / "labels.parquet", "labels").to_pylist()
+    if not boxes:
+        return
+    counts = read_json(folder / "ingest.report.json", "report")["counts"]
+    centre = np.array([[row["x_center"], row["y_center"]] for row in boxes])
+    half = np.array([[row["width"], row["height"]] for row in boxes]) / 2
+    names = np.array([row["class"] for row in boxes])
+    distance = deviation = np.full(len(boxes), np.nan)
+    if "irregularities" in stages:
+        table = read_table(folder / "irregularities.parquet", "irregularities")
+        distance, up, down = (
+            table[name].to_numpy().astype(np.float64)
+            for name in ("distance_m", "elevation_m", "depression_m")
+        )
+        deviation = np.where(names == "positive", up, -down)
+    draw_labels(
+        out,
+        Labels(
+            names,
+            np.concatenate([centre - half, centre + half], axis=1),
+            (counts["camera_left_width_px"], counts["camera_left_height_px"]),
+            distance,
+            deviation,
+        ),
     )
 
 
@@ -119,7 +158,14 @@ FIGURES: Mapping[str, tuple[Set[str], Callable[[Path, Collection[str], Path], No
     "map": (
         {"calibration", "poses"},
         _map,
-        "The drive from above: its track over the highest static voxel of each spot.",
+        "The drive from above: its track over the highest static voxel of each spot, and the labelled "
+        "irregularities, each once.",
+    ),
+    "labels": (
+        {"annotations"},
+        _labels,
+        "The labels: how many boxes cover each spot of the left image, their size against the distance of "
+        "what they show, and how far the ground truth in them rises or falls.",
     ),
     "excitation": (
         {"wheels"},
