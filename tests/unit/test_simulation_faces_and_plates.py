@@ -5,7 +5,11 @@ import numpy as np
 import pytest
 
 from card.errors import CardError
+from card.simulation.bodies import car, walker
 from card.simulation.faces_and_plates import PLATE_SIZE_M, face_texture, plate_texture
+from card.simulation.mesh import Mesh
+from card.simulation.raycast import Scene
+from card.simulation.surfaces import LOOKS, Surface
 
 
 def _found_at_centre(scene: np.ndarray, cascade: str, width: int) -> bool:
@@ -58,3 +62,54 @@ def test_same_index_same_face_and_other_index_another() -> None:
 def test_unknown_country_is_refused() -> None:
     with pytest.raises(CardError, match=r"no number plate.*found FR, wanted DE or IT"):
         plate_texture("FR", np.random.default_rng(0))
+
+
+def _drawn(
+    body: Mesh, texture: np.ndarray, centre: tuple[float, float, float], angle: float, width_m: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """A body seen from 6 m at ``angle`` to its front, and which pixels show its textured thing 0."""
+    size, middle = 120, np.array(centre)
+    turn = np.radians(angle)
+    eye = middle + 6 * np.array([np.sin(turn), np.cos(turn), 0])
+    ahead = (middle - eye) / 6
+    right = np.cross(ahead, [0.0, 0.0, 1.0])
+    steps = (np.arange(3 * size) + 0.5) / (3 * size) - 0.5
+    x, z = np.meshgrid(width_m * steps, -width_m * steps)
+    rays = (6 * ahead + x[..., None] * right + z[..., None] * [0, 0, 1]).reshape(-1, 3)
+    hits = Scene(body).cast(eye, rays / np.linalg.norm(rays, axis=1, keepdims=True))
+    met = hits.triangle >= 0
+    triangle = hits.triangle[met]
+    albedo = np.array([LOOKS[s].albedo for s in Surface])[body.surface[triangle]] * body.tint[triangle]
+    light = 0.5 + 0.5 * np.abs(hits.normal[met] @ [0.3, 0.6, 0.74])
+    image = np.full((len(rays), 3), 0.55)
+    image[met] = (albedo * light[:, None]) ** (1 / 2.2)
+    shown = np.flatnonzero(met)[body.thing[triangle] == 0]
+    corners, weights = body.uv[body.triangles[hits.triangle[shown]]], hits.barycentric[shown, :, None]
+    uv = corners[:, 0] + np.sum(weights * (corners[:, 1:] - corners[:, :1]), axis=1)
+    u, v = (
+        np.clip(uv[:, i] * n, 0, n - 1).astype(int) for i, n in ((0, texture.shape[1]), (1, texture.shape[0]))
+    )
+    image[shown] = texture[v, u] / 255
+    picture = np.clip(255 * image, 0, 255).astype(np.uint8).reshape(3 * size, 3 * size, 3)
+    return cv2.resize(picture, (size, size), interpolation=cv2.INTER_AREA), np.isin(
+        np.arange(len(rays)), shown
+    )
+
+
+@pytest.mark.parametrize("angle", [0, -20, 25])
+def test_a_haar_detector_finds_a_walker_s_face_of_40_px(angle: float) -> None:
+    scene, _ = _drawn(walker(np.full((2, 3), 0.2), 0, 0.0, 1.75), face_texture(3), (0, 0, 1.6), angle, 0.65)
+    assert _found_at_centre(scene, "haarcascade_frontalface_default.xml", 60)
+
+
+def test_nothing_of_a_face_is_seen_from_behind() -> None:
+    _, shown = _drawn(walker(np.full((2, 3), 0.2), 0, 0.0, 1.75), face_texture(3), (0, 0, 1.6), 180, 0.65)
+    assert not shown.any()
+
+
+@pytest.mark.parametrize(("angle", "plates"), [(0, (0, 1)), (15, (0, 1)), (180, (1, 0))])
+def test_a_haar_detector_finds_a_car_s_plate_of_60_px(angle: float, plates: tuple[int, int]) -> None:
+    texture = plate_texture("DE", np.random.default_rng(2))
+    height, y = (0.50, 2.2) if plates[0] == 0 else (0.70, -2.2)
+    scene, _ = _drawn(car((0.3, 0.05, 0.05), plates), texture, (0, y, height), angle, 1.04)
+    assert _found_at_centre(scene, "haarcascade_russian_plate_number.xml", 60)

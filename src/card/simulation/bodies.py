@@ -18,6 +18,8 @@ EYE_HEIGHT_M = 1.60
 HEADLIGHTS_M = np.array([[-0.66, 2.22, 0.73], [0.66, 2.22, 0.73]])
 EGO_HEADLIGHTS_M = np.array([[-0.7, 1.67, -1.0], [0.7, 1.67, -1.0]])
 _PLATE_GAP_M = 0.015
+#: Where a face's outline is along the head, and by how much its middle stands out from there.
+_FACE_BACK_M, _FACE_DEPTH_M = -0.005, 0.125
 
 #: Side view of a car: (y, z) of the body's outline and of the cabin on top of it.
 _CAR_BODY = [(-2.2, 0.32), (-2.2, 0.85), (-1.9, 0.98), (1.0, 0.95), (2.0, 0.78), (2.2, 0.62), (2.2, 0.32)]
@@ -67,7 +69,7 @@ def walker(colours: Array, face: int, head_turn: float, height: float) -> Mesh:
     k = height / 1.75
     head = join(
         [
-            ellipsoid((0, -0.015, 0), (0.088, 0.105, 0.13), Surface.SKIN, (0.35, 0.3, 0.28)),
+            ellipsoid((0, -0.02, 0), (0.112, 0.12, 0.137), Surface.SKIN, (0.35, 0.3, 0.28)),
             _face_patch(face),
         ]
     )
@@ -138,14 +140,14 @@ def _plate(centre: Array, facing: float, thing: int) -> Mesh:
 
 
 def _face_patch(thing: int) -> Mesh:
-    """A slightly curved patch in front of the head, seen from +y."""
+    """The oval of a face's picture, laid around the front of the head, seen from +y."""
     height, width = FACE_SIZE_M
-    u = np.linspace(0, 1, 7)
-    x = (0.5 - u) * width
-    y = np.sqrt(0.16**2 - x**2) - 0.16 + 0.105
-    z = np.array([height / 2, 0.0, -height / 2])
-    points = np.stack(np.broadcast_arrays(x, y, z[:, None]), axis=-1)
-    uv = np.stack(np.broadcast_arrays(u, np.array([[0.0], [0.5], [1.0]])), axis=-1)
-    patch = grid(points, Surface.FACE, uv=uv)
+    u, v = np.meshgrid(np.linspace(-1, 1, 11), np.linspace(-1, 1, 11))
+    # A square pressed into a disc.
+    across, down = u * np.sqrt(1 - v**2 / 2), v * np.sqrt(1 - u**2 / 2)
+    x, z = -0.97 * across * width / 2, -0.97 * down * height / 2
+    y = _FACE_BACK_M + _FACE_DEPTH_M * np.sqrt(np.maximum(1 - across**2 - down**2, 0))
+    uv = np.stack([(1 + across) / 2, (1 + down) / 2], axis=-1)
+    patch = grid(np.stack([x, y, z], axis=-1), Surface.FACE, uv=uv)
     patch.thing[:] = thing
     return patch
