@@ -33,7 +33,7 @@ def write_frame_truth(world: World, truth: Path) -> None:
     bodies = [*(("car", index) for index in world.cars), *(("walker", index) for index in world.walkers)]
     paths = [Trajectory(times, *_parts(world.movers[index].path.at(times))) for _, index in bodies]
     movers = {
-        "kind": np.repeat([kind for kind, _ in bodies], count),
+        "kind": np.repeat(np.array([kind for kind, _ in bodies], np.str_), count),
         "mover": np.repeat(np.array([index for _, index in bodies], np.int32), count),
         "t_ns": np.tile(times, len(bodies)),
         **{
