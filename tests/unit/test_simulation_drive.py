@@ -19,6 +19,7 @@ from card.simulation.drives import DRIVES, drive_named
 from card.simulation.labels import outline, road_boxes
 from card.simulation.raycast import Tracer
 from card.simulation.scales import scale_named
+from card.simulation.session_drive import write_session_drive
 from card.simulation.simulate import simulate_drive
 from card.simulation.surfaces import Surface
 from card.simulation.vehicle import course
@@ -160,6 +161,14 @@ def test_another_seed_makes_another_world(world: World) -> None:
     assert np.abs(world.road.xyz(s, 1.0) - other.road.xyz(s, 1.0)).max() > 0.05
     assert world.static.vertices.shape != other.static.vertices.shape
     assert not np.allclose(world.sun, other.sun)
+
+
+def test_a_session_s_drive_without_others_on_the_road_has_its_truth(tmp_path: Path) -> None:
+    write_session_drive(
+        "2026-04-14-mid", folder=tmp_path / "drive", truth=tmp_path / "truth", scale="tiny", seed=5
+    )
+    assert read_table(tmp_path / "truth" / "movers.parquet", "truth_movers").num_rows == 0
+    assert read_table(tmp_path / "truth" / "frames.parquet", "truth_frames").num_rows == 6
 
 
 def test_unknown_drive_or_scale(tmp_path: Path) -> None:
