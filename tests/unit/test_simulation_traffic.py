@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from card.geometry import inverse
-from card.simulation.bodies import CAR_LENGTH_M, CAR_WHEELBASE_M, CAR_WIDTH_M
+from card.simulation.bodies import CAR_LENGTH_M, CAR_TRACK_M, CAR_WHEELBASE_M, CAR_WIDTH_M
 from card.simulation.car_following import Barrier, flow
 from card.simulation.mesh import join
 from card.simulation.raycast import Scene
@@ -169,16 +169,27 @@ def test_there_is_a_car_behind_and_one_ahead_in_our_lane(busy: World) -> None:
     assert (ahead, behind) == (world.drive.leader, world.drive.follower)
 
 
-def test_cars_stand_on_both_axles(busy: World) -> None:
+def test_moving_cars_have_their_wheels_on_the_road(busy: World) -> None:
     times = _standing_times(busy)
     for index in busy.cars[:3]:
         pose = busy.movers[index].path.at(times)
         here = abs(pose[:, 2, 3] - busy.road.land(pose[:, :2, 3])) < 5
         guess = _nearest_s(busy, pose[here, :2, 3])
         for axle in (-CAR_WHEELBASE_M / 2, CAR_WHEELBASE_M / 2):
-            foot = pose[here] @ [0.0, axle, 0.0, 1.0]
-            ground = busy.road.height(foot[:, :2], guess)
-            assert np.quantile(np.abs(foot[:, 2] - ground), 0.95) < 0.03
+            feet = [pose[here] @ [side, axle, 0.0, 1.0] for side in (-CAR_TRACK_M / 2, CAR_TRACK_M / 2)]
+            gap = [foot[:, 2] - busy.road.height(foot[:, :2], guess) for foot in feet]
+            assert np.quantile(np.abs(np.mean(gap, axis=0)), 0.95) < 0.03
+
+
+def test_parked_cars_stand_on_road_and_kerb(busy: World) -> None:
+    mesh = busy.static
+    tyres = np.unique(mesh.triangles[mesh.surface == Surface.TYRE])
+    wheels = mesh.vertices[tyres].reshape(-1, 44, 3)  # four rings of eleven each
+    assert len(wheels) >= 8
+    lowest = wheels[np.arange(len(wheels)), wheels[..., 2].argmin(axis=1)]
+    middle = wheels.mean(axis=1)
+    gap = lowest[:, 2] - busy.road.height(middle[:, :2], _nearest_s(busy, middle[:, :2]))
+    assert np.abs(gap).max() < 0.06
 
 
 def _nearest_s(world: World, xy: Array) -> Array:

@@ -10,7 +10,7 @@ from card.simulation.surfaces import Surface
 
 Array = NDArray[np.float64]
 
-CAR_LENGTH_M, CAR_WIDTH_M, CAR_WHEELBASE_M = 4.4, 1.8, 2.7
+CAR_LENGTH_M, CAR_WIDTH_M, CAR_WHEELBASE_M, CAR_TRACK_M = 4.4, 1.8, 2.7, 1.76
 #: Offset to the side and height of the joints of a walker 1.75 m tall.
 HIP_M, SHOULDER_M = (0.10, 0.92), (0.22, 1.42)
 EYE_HEIGHT_M = 1.60
@@ -37,7 +37,7 @@ def car(colour: ArrayLike, plates: tuple[int, int], *, lit: bool = True) -> Mesh
         _plate(np.array([0.0, CAR_LENGTH_M / 2 + _PLATE_GAP_M, 0.50]), 1.0, plates[0]),
         _plate(np.array([0.0, -CAR_LENGTH_M / 2 - _PLATE_GAP_M, 0.70]), -1.0, plates[1]),
     ]
-    for side in (-half + 0.02, half - 0.02):
+    for side in (-CAR_TRACK_M / 2, CAR_TRACK_M / 2):
         for y in (-CAR_WHEELBASE_M / 2, CAR_WHEELBASE_M / 2):
             parts.append(cylinder((side - 0.1, y, 0.33), (side + 0.1, y, 0.33), (0.33, 0.33), Surface.TYRE))
         for y, colour_lamp in ((-2.205, (1.0, 0.05, 0.05)), (2.205, (1.0, 1.0, 0.9))):

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from card.geometry import Trajectory, quaternion_from_matrix, transform
 from card.simulation.bodies import (
     CAR_LENGTH_M,
+    CAR_TRACK_M,
     CAR_WHEELBASE_M,
     HIP_M,
     SHOULDER_M,
@@ -159,7 +160,7 @@ class Traffic:
         if lamps or sharp or (self._kept_clear is not None and self._apart(s, self._kept_clear) < 6.0):
             return
         self._parked_at.append((s, d))
-        pose = self.road.pose(s, d, 0.0 if side > 0 else np.pi)
+        pose = self._on_wheels(np.array([s]), np.array([d]), backwards=side < 0)[0]
         self.parked.append(self._car(lit=False).moved(pose))
 
     def _cross_all(self, look: float) -> None:
@@ -181,18 +182,29 @@ class Traffic:
         return gap
 
     def _drive(self, s: Array, d: float, *, backwards: bool = False) -> None:
-        """A car over arc lengths (N,), both axles on the road."""
-        sign = -1.0 if backwards else 1.0
-        reach = sign * CAR_WHEELBASE_M / 2
-        offset = np.full_like(s, d)
-        pose = self._pose(s, offset, np.full_like(s, np.pi if backwards else 0.0))
-        if not self.road.line.closed:
-            s = np.clip(s, self.road.line.start + 5, self.road.line.start + self.road.line.length - 5)
-        front, rear = (self.road.xyz(s + along, offset)[:, 2] for along in (reach, -reach))
-        pose[:, 2, 3] += (front + rear) / 2 - self.road.xyz(s, offset)[:, 2]
-        pose = pose @ _about_x(np.arctan2(front - rear, CAR_WHEELBASE_M))
+        """A car over arc lengths (N,), its wheels on the road."""
+        pose = self._on_wheels(s, np.full_like(s, d), backwards=backwards)
         self.cars.append(len(self.movers))
         self.movers.append(Mover(self._car(lit=True), self._path(pose)))
+
+    def _on_wheels(self, s: Array, d: Array, *, backwards: bool) -> Array:
+        """``world_from_body`` (N, 4, 4) of a car on the plane nearest to the ground under its four wheels."""
+        sign = -1.0 if backwards else 1.0
+        pose = self._pose(s, d, np.full_like(s, np.pi if backwards else 0.0))
+        kept = self._on_road(s)
+        ground = np.array(
+            [
+                [
+                    self.road.xyz(kept + sign * y, d + sign * x)[:, 2]
+                    for x in (-CAR_TRACK_M / 2, CAR_TRACK_M / 2)
+                ]
+                for y in (CAR_WHEELBASE_M / 2, -CAR_WHEELBASE_M / 2)
+            ]
+        )
+        pose[:, 2, 3] += ground.mean(axis=(0, 1)) - self.road.xyz(kept, d)[:, 2]
+        (front, rear), (left, right) = ground.mean(axis=1), ground.mean(axis=0)
+        rise, roll = np.arctan2(front - rear, CAR_WHEELBASE_M), np.arctan2(left - right, CAR_TRACK_M)
+        return pose @ _turn(rise, 0) @ _turn(roll, 1)
 
     def _walk(self, way: Way, head_turn: float) -> None:
         colours = _COLOURS[self.rng.integers(0, len(_COLOURS), 2)] * self.rng.uniform(0.7, 1.2, (2, 1))
@@ -209,17 +221,19 @@ class Traffic:
             ):
                 angle = swing(way, 1 / _PATH_HZ, widest, phase + turn * np.pi / 2)
                 hung = transform(np.array([side * joint[0], 0.0, joint[1]]) * height / 1.75)
-                self.movers.append(Mover(limb, self._path(trunk @ hung @ _about_x(angle))))
+                self.movers.append(Mover(limb, self._path(trunk @ hung @ _turn(angle, 0))))
 
     def _pose(self, s: Array, d: Array, turn: Array) -> Array:
         """``world_from_body`` (N, 4, 4) on the road; what is beyond its ends waits out of sight."""
-        line = self.road.line
-        if line.closed:
-            return self.road.pose(s, d, turn)
-        kept = np.clip(s, line.start + 5, line.start + line.length - 5)
+        kept = self._on_road(s)
         pose = self.road.pose(kept, d, turn)
         pose[:, 2, 3] -= np.where(kept == s, 0.0, _OUT_OF_SIGHT_M)
         return pose
+
+    def _on_road(self, s: Array) -> Array:
+        """Arc lengths (N,), those beyond an open road's ends at its ends."""
+        line = self.road.line
+        return s if line.closed else np.clip(s, line.start + 5, line.start + line.length - 5)
 
     def _path(self, pose: Array) -> Trajectory:
         t_ns = self.start_ns + np.round(self._time * 1e9).astype(np.int64)
@@ -236,8 +250,8 @@ class Traffic:
         return float(np.clip(np.interp(s - 5.0, self.course.s, self.course.t), 0, duration_s))
 
 
-def _about_x(angle: Array) -> Array:
-    """Turns (N, 4, 4) of a body to its front by ``angle`` (N,) rad: its y rises."""
-    zero = np.zeros_like(angle)
-    quaternion = np.stack([np.cos(angle / 2), np.sin(angle / 2), zero, zero], axis=-1)
+def _turn(angle: Array, axis: int) -> Array:
+    """Turns (N, 4, 4) by ``angle`` (N,) rad about x (axis 0: the front rises) or y (1: the left rises)."""
+    quaternion = np.zeros((len(angle), 4))
+    quaternion[:, 0], quaternion[:, 1 + axis] = np.cos(angle / 2), np.sin(angle / 2)
     return transform(np.zeros((len(angle), 3)), quaternion)
