@@ -69,3 +69,16 @@ def test_distortion_that_folds_back_brings_nothing_onto_the_image(tmp_path):
     far = np.array([[3.1 * 5, 0.0, 5.0]])
     assert camera.image.contains(camera.image.distort(far[:, :2] / far[:, 2:]) * 120 + [99.5, 79.5]).all()
     assert len(camera.raster(far)[0]) == 0
+
+
+def test_raster_order_decides_ties_of_depth_by_x_and_y(camera):
+    rng = np.random.default_rng(0)
+    points = np.c_[rng.uniform(-0.02, 0.02, (4000, 2)), rng.integers(1, 4, 4000)] * (1, 1, 0.5)
+    points = np.concatenate([points, points[:50]])
+    index, pixels = camera.raster(points)
+    assert len(index) == len(points)
+    column, row = pixels.T
+    x, y, z = points[index].T
+    expected = np.lexsort((y, x, z, column, row))
+    assert np.array_equal(points[index], points[index][expected])
+    assert np.array_equal(pixels, pixels[expected])

@@ -124,8 +124,7 @@ class _Work:
         keyframe = self.drive.sweep(task.keyframe).points if task.keyframe >= 0 else np.empty((0, 3))
         frame = build_frame(selection, keyframe, world_from_rig, self.camera, self.settings, workspace)
         write_arrays(self.folder / f"{task.frame:06d}.npz", {"points": frame.points}, "ground_truth_points")
-        width, height = self.camera.image.width, self.camera.image.height
-        share = len(np.unique(frame.pixels @ (1, width))) / (width * height)
+        share = frame.pixels / (self.camera.image.width * self.camera.image.height)
         return {"frame": task.frame, **selected.columns, **frame.counts, "image_share": share}
 
 

@@ -34,10 +34,10 @@ STEPS = (
 
 @dataclass(frozen=True)
 class Frame:
-    """points: (N, 3) float32, camera_left, metres, in raster order. counts: by STEPS. pixels: (N, 2)."""
+    """points: (N, 3) float32, camera_left, metres, in raster order. counts: by STEPS. pixels: hit."""
 
     points: npt.NDArray[np.float32]
-    pixels: npt.NDArray[np.int64]
+    pixels: int
     counts: dict[str, int]
 
 
@@ -76,4 +76,5 @@ def build_frame(
         "points_pass_2": len(visible),
         "points_saved": len(on_image),
     }
-    return Frame(visible[on_image].astype(np.float32), pixels, {name: counts[name] for name in STEPS})
+    different = int(np.count_nonzero(np.diff(pixels, axis=0).any(axis=1))) + min(len(pixels), 1)
+    return Frame(visible[on_image].astype(np.float32), different, {name: counts[name] for name in STEPS})

@@ -73,8 +73,21 @@ class LeftCamera:
         pixels = self.image.project(points)
         on = np.flatnonzero(self.image.contains(pixels) & self.in_view(points, 0.0, 0.0))
         column, row = np.rint(pixels[on]).astype(np.int64).T
-        order = np.lexsort((points[on, 1], points[on, 0], points[on, 2], column, row))
+        order = _raster_order(points[on], row * self.image.width + column)
         return on[order], np.stack([column, row], axis=1)[order]
+
+
+def _raster_order(points: Points, pixel: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    """The order of points (N, 3), z >= 0, by pixel, depth, x and y."""
+    # Floats that are not negative sort as their bits do, so nearly all is decided by one whole number.
+    packed = (pixel << 32) | points[:, 2].astype(np.float32).view(np.int32)
+    order = np.argsort(packed)
+    same = np.diff(packed[order]) == 0
+    tied = np.flatnonzero(np.r_[same, False] | np.r_[False, same])
+    rest = order[tied]
+    x, y, z = points[rest].T
+    order[tied] = rest[np.lexsort((y, x, z, packed[rest]))]
+    return order
 
 
 def _border(width: int, height: int) -> Points:
