@@ -55,4 +55,5 @@ def _flag(columns: Mapping[str, Any], has_keyframe: bool, min_share: float) -> s
         return "no_rear"
     if not has_keyframe:
         return "no_keyframe"
-    return "cut" if columns["window_share"] < min_share else "complete"
+    # A LiDAR that is silent for seconds leaves its own window thin, however long the other's is.
+    return "cut" if min(columns["front_share"], columns["rear_share"]) < min_share else "complete"
