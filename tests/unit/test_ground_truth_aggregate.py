@@ -226,6 +226,17 @@ def test_a_burst_that_comes_twice(drive, tmp_path):
         attempt(inputs, tmp_path)
 
 
+def test_a_burst_within_another(drive, tmp_path):
+    def stretched(table):
+        ends = table["t_end_ns"].to_numpy().copy()
+        ends[3] = ends[5] + 1
+        return table.set_column(3, "t_end_ns", [ends])
+
+    inputs = altered(drive, tmp_path, "bursts", stretched)
+    with pytest.raises(CardError, match="lies within another"):
+        attempt(inputs, tmp_path)
+
+
 def test_a_wrong_ego_mask(drive, tmp_path):
     write_mask(tmp_path / "mask.png", 100, 100)
     with pytest.raises(CardError, match="ego mask of the wrong size"):

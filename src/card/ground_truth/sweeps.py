@@ -144,9 +144,17 @@ class Drive:
                 wanted=f"{self.start_ns[i]}..{self.end_ns[i]} ns",
             )
         for front in (True, False):
-            again = np.flatnonzero(np.diff(np.sort(self.start_ns[self.of(front)])) == 0)
-            if len(again):
-                raise CardError("two bursts start at the same time", where=bursts, found=len(again), wanted=0)
+            step = np.diff(self.start_ns[self.of(front)])
+            if (step == 0).any():
+                raise CardError(
+                    "two bursts start at the same time", where=bursts, found=int((step == 0).sum()), wanted=0
+                )
+            if (step < 0).any():
+                raise CardError(
+                    "a burst lies within another of its LiDAR",
+                    where=self.files[self.of(front)[int(np.argmin(step)) + 1]],
+                    wanted="one burst after the other",
+                )
 
 
 def _crop(
