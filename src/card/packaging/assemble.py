@@ -124,6 +124,11 @@ def assemble(
             templates=release_folder,
             release=document,
             sequences=rows,
+            frames=frames,
+            quality=[
+                read_json(tree / "sequences" / item["id"] / "quality.json", "quality") for item in ordered
+            ],
+            retracted=len(retracted),
             terms=terms,
             about=settings["release"],
             gate=None if settings["hub"]["gated"] == "none" else settings["hub"]["gate_text"],
@@ -140,7 +145,9 @@ def assemble(
         write_json(tree / "changes.json", difference, "changes")
         hashes["changes.json"] = sha256_file(tree / "changes.json")
         write_json(
-            tree / "croissant.json", croissant(document, terms, settings["release"], hashes), "croissant"
+            tree / "croissant.json",
+            croissant(document, terms, settings["release"], hashes, rows),
+            "croissant",
         )
         hashes["croissant.json"] = sha256_file(tree / "croissant.json")
         _write_sums(tree, hashes)

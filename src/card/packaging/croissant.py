@@ -1,9 +1,10 @@
 """`croissant.json`: the tree as Croissant 1.1 metadata (https://docs.mlcommons.org/croissant/)."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from card.artifacts import load_schema
+from card.packaging.rai import VERSION, rai_fields
 from card.packaging.reader import SPLITS
 
 CONTEXT = {
@@ -21,6 +22,7 @@ CONTEXT = {
     "field": "cr:field",
     "fileObject": "cr:fileObject",
     "fileSet": "cr:fileSet",
+    "rai": "http://mlcommons.org/croissant/RAI/",
     "recordSet": "cr:recordSet",
     "source": "cr:source",
 }
@@ -36,18 +38,24 @@ TABLES = {
     **{f"metadata/frames-{split}.parquet": "release_frames" for split in SPLITS},
     "metadata/sequences.parquet": "release_sequences",
     "metadata/members.parquet": "release_members",
+    "metadata/files.parquet": "release_files",
+    "metadata/retractions.parquet": "retractions",
 }
 
 
 def croissant(
-    release: Mapping[str, Any], terms: Mapping[str, Any], about: Mapping[str, str], sha256: Mapping[str, str]
+    release: Mapping[str, Any],
+    terms: Mapping[str, Any],
+    about: Mapping[str, Any],
+    sha256: Mapping[str, str],
+    sequences: Sequence[Mapping[str, Any]],
 ) -> dict[str, Any]:
-    """Croissant document of a tree whose files (path -> hash) are `sha256`."""
+    """Croissant document of a tree with files `sha256` (path -> hash) and rows `sequences` of their table."""
     files = [path for path in sorted(sha256) if path in TABLES or path.endswith(".tar")]
     return {
         "@context": CONTEXT,
         "@type": "sc:Dataset",
-        "conformsTo": "http://mlcommons.org/croissant/1.1",
+        "conformsTo": ["http://mlcommons.org/croissant/1.1", VERSION],
         "name": release["repository"],
         "description": f"{about['title']}: driving sequences with quasi-dense 3D ground truth of the road. "
         f"{terms['attribution']}.",
@@ -58,7 +66,8 @@ def croissant(
         "creator": {"@type": "sc:Organization", "name": about["creator"]},
         "citeAs": f"{about['creator']}: {about['title']}, {release['repository']} {release['version']}.",
         "distribution": [_file(path, sha256[path]) for path in files],
-        "recordSet": [_records(path, schema) for path, schema in TABLES.items()],
+        "recordSet": [record_set(path, schema) for path, schema in TABLES.items()],
+        **rai_fields(release, sequences, about["contact"]),
     }
 
 
@@ -74,7 +83,8 @@ def _file(path: str, sha256: str) -> dict[str, Any]:
     }
 
 
-def _records(path: str, schema: str) -> dict[str, Any]:
+def record_set(path: str, schema: str) -> dict[str, Any]:
+    """One table of the tree with its columns."""
     name = path.split("/")[1].removesuffix(".parquet")
     return {
         "@type": "cr:RecordSet",

@@ -9,6 +9,7 @@ import yaml
 
 from card.artifacts import load_schema
 from card.errors import CardError
+from card.packaging import card_tables
 from card.packaging.reader import SPLITS
 
 COPIED = ("CONVENTIONS.md", "CHANGELOG.md")
@@ -22,6 +23,9 @@ def write_pages(
     templates: Path,
     release: Mapping[str, Any],
     sequences: Sequence[Mapping[str, Any]],
+    frames: Sequence[Mapping[str, Any]],
+    quality: Sequence[Mapping[str, Any]],
+    retracted: int,
     terms: Mapping[str, Any],
     about: Mapping[str, Any],
     gate: str | None,
@@ -33,7 +37,8 @@ def write_pages(
     Parameters
     ----------
     templates : folder `release/`.
-    release : document `release`; sequences : rows of the sequence table.
+    release : document `release`; sequences, frames : rows of these tables.
+    quality : documents `quality` of the sequences. retracted : rows of the table of retractions.
     terms : the licence's entry of `config/licenses.yaml`.
     about : title, creator, authors, contact and url from the settings.
     gate : what readers of a gated repository agree to, None for an open one.
@@ -60,24 +65,16 @@ def write_pages(
         ),
         "authors": yaml.safe_dump([{"name": name} for name in about["authors"]], allow_unicode=True),
         "example_split": next((split for split in SPLITS if release["frames"][split]), SPLITS[0]),
-        "counts": _counts(release, sequences),
-        "split_table": _table(("split", "frames"), [(split, release["frames"][split]) for split in SPLITS]),
-        "split_figures": _split_figures(splits),
-        "sequence_table": _table(
-            (
-                "sequence",
-                "place",
-                "road type",
-                "frames",
-                "reviewed",
-                "positive",
-                "negative",
-                "seconds",
-                "metres",
-            ),
-            [_sequence_cells(row) for row in sequences],
+        "counts": card_tables.counts(release, sequences),
+        "split_table": card_tables.table(
+            ("split", "frames"), [(split, release["frames"][split]) for split in SPLITS]
         ),
-        "known_issues": _known_issues(release, sequences),
+        "split_figures": card_tables.split_figures(splits),
+        "distribution": card_tables.distribution(frames),
+        "place_table": card_tables.places(sequences),
+        "sequence_table": card_tables.sequence_table(sequences),
+        "quality_table": card_tables.quality_figures(quality),
+        "known_issues": card_tables.known_issues(release, sequences, frames, retracted),
     }
     for name in FILLED:
         template = templates / f"{name}.tmpl"
@@ -134,71 +131,3 @@ def _features(schema: str) -> list[dict[str, str]]:
         {"name": name, "dtype": "image" if field["type"] == "binary" else field["type"]}
         for name, field in load_schema(schema)["columns"].items()
     ]
-
-
-def _counts(release: Mapping[str, Any], sequences: Sequence[Mapping[str, Any]]) -> str:
-    seconds = sum(row["t_end_ns"] - row["t_start_ns"] for row in sequences) / 1e9
-    metres = sum(row["distance_m"] or 0 for row in sequences)
-    places = len({row["place"] for row in sequences})
-    frames = sum(release["frames"].values())
-    return (
-        f"{len(sequences)} sequences from {places} places, {seconds / 3600:.3g} h, {metres / 1000:.3g} km, "
-        f"{frames} frames, {release['files']} files, {release['bytes'] / 1e9:.3g} GB."
-    )
-
-
-def _split_figures(report: Mapping[str, Any] | None) -> str:
-    """What the splits are worth, as far as it is known."""
-    if report is None:
-        return "There are no frames to split."
-    value = {figure["name"]: figure["value"] for figure in report["figures"]}
-    counts = report["counts"]
-    unknown = (
-        f" {counts['test_unknown']} test frames have training frames of their place without a common map."
-    )
-    near = (
-        f"95 % of the test frames lie {value['leak_m_p5']:.0f} m or more from the nearest training frame."
-        if value["leak_m_p5"] is not None
-        else "No training frame is known to be near a test frame."
-    )
-    balance = (
-        f" Shares of the strata are off their targets by {value['stratum_deviation']:.3f} on average."
-        if value["stratum_deviation"] is not None
-        else ""
-    )
-    return near + (unknown if counts["test_unknown"] else "") + balance
-
-
-def _sequence_cells(row: Mapping[str, Any]) -> tuple[Any, ...]:
-    seconds = (row["t_end_ns"] - row["t_start_ns"]) / 1e9
-    metres = "-" if row["distance_m"] is None else f"{row['distance_m']:.0f}"
-    return (
-        row["sequence"],
-        row["place"],
-        row["road_type"],
-        row["frames"],
-        row["reviewed_frames"],
-        row["boxes_positive"],
-        row["boxes_negative"],
-        f"{seconds:.1f}",
-        metres,
-    )
-
-
-def _known_issues(release: Mapping[str, Any], sequences: Sequence[Mapping[str, Any]]) -> str:
-    lines = [
-        f"- `{item['sequence']}`: {item['stage']} failed its gate `{item['figure']}`; released because "
-        f"{item['reason']} (signed by {item['signed_by']})."
-        for item in release["overrides"]
-    ]
-    for row in sequences:
-        if left := row["frames"] - row["reviewed_frames"]:
-            lines.append(
-                f"- `{row['sequence']}`: labels of {left} of {row['frames']} frames are not reviewed."
-            )
-    return "\n".join(lines) or "None known."
-
-
-def _table(head: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in lines)

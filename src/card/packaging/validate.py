@@ -12,6 +12,7 @@ from card.artifacts import Figure, write_report
 from card.errors import CardError
 from card.packaging.checks.card_page import check_card_page
 from card.packaging.checks.contents import read_contents
+from card.packaging.checks.croissant import check_croissant, check_croissant_format
 from card.packaging.checks.files import check_files
 from card.packaging.checks.geometry import check_geometry
 from card.packaging.checks.licenses import check_licenses
@@ -28,6 +29,7 @@ CHECKS = (
     check_geometry,
     check_licenses,
     check_card_page,
+    check_croissant,
 )
 logger = logging.getLogger("card")
 
@@ -76,6 +78,8 @@ def find_problems(
     findings = contents.findings + [line for check in CHECKS for line in check(contents)]
     if ledger is not None:
         findings += check_splits(contents, ledger)
+    if not findings:
+        findings += check_croissant_format(contents)
     # An empty tree has no configs, and `datasets` would make one up.
     if load and contents.sequences and not findings:
         findings += _check_loading(tree)
