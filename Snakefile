@@ -8,6 +8,7 @@
 #   snakemake label_consistency --cores 2   how well that detector repeats the labels
 #   snakemake upload --cores 2            what an upload would do; with --config send=true do it
 #   snakemake assign_splits --cores 2     give new sequences their rows in the splits ledger
+#   snakemake assign_batches --cores 2    move sequences that do not fit into further repositories
 from snakemake.utils import min_version
 
 min_version("9.27")

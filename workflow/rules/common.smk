@@ -9,6 +9,7 @@ from card.artifacts.code import code_hash
 from card.artifacts.documents import read_yaml
 from card.artifacts.schemas import check, load_schema, schema_folder, with_defaults
 from card.errors import CardError
+from card.packaging.batches import batch_repository, read_batches
 from card.packaging.licenses import license_of, read_licenses
 from card.packaging.summary import summarize
 from card.packaging.takedowns import read_takedowns, whole_sequences
@@ -108,6 +109,7 @@ def check_raw_input(row):
 try:
     check_records()
     LICENSES, GATES, LEDGER, TAKEDOWNS, ROWS, SEQUENCES = load_plan()
+    BATCHES = read_batches(Path(SETTINGS["batches_ledger"]))
 except CardError as error:
     raise WorkflowError(f"card: {error}") from None
 

@@ -1,7 +1,15 @@
 # Needs: every artifact of a sequence with its report, never a raw image; the release templates; the splits.
 # Makes: results/{id}/package/, one whole tree a licence under results/release/, its validation, the firewall's report.
+# Every repository with its licence: the licence's own, and those of later batches.
 REPOSITORIES = {
-    terms["repository"]: spdx for spdx, terms in LICENSES["licenses"].items()
+    batch_repository(terms["repository"], batch): spdx
+    for spdx, terms in LICENSES["licenses"].items()
+    for batch in sorted({1, *BATCHES.values()})
+    if batch == 1
+    or any(
+        BATCHES.get(row.id) == batch and license_of(row.country, LICENSES) == spdx
+        for row in ROWS
+    )
 }
 TREE = f"{RELEASE}/{{repository}}"
 TEMPLATES = Path(os.path.relpath(BASE / "release"))
@@ -95,6 +103,23 @@ rule validate_tree:
         ),
     script:
         "../scripts/validate_tree.py"
+
+
+rule assign_batches:
+    # The committed ledger is not a result: this rule makes no file and runs whenever it is asked for.
+    input:
+        packages=expand(rules.package.output.inventory, id=list(SEQUENCES)),
+    log:
+        "logs/assign_batches.log",
+    params:
+        cfg=cfg("packaging", "hub"),
+        ledger=SETTINGS["batches_ledger"],
+        repositories=[
+            LICENSES["licenses"][license_of(row.country, LICENSES)]["repository"]
+            for row in SEQUENCES.values()
+        ],
+    script:
+        "../scripts/assign_batches.py"
 
 
 rule firewall:

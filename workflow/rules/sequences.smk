@@ -140,11 +140,10 @@ def has_regions(name):
 
 def tree_takedowns(wildcards):
     """Takedowns of sequences that are, or were, in a tree; a subset knows of its own only."""
-    spdx = REPOSITORIES[wildcards.repository]
     names = {
         row.id
         for row in ROWS
-        if license_of(row.country, LICENSES) == spdx
+        if repository_of(row) == wildcards.repository
         and (not SUBSET or row.id in SUBSET)
     }
     return [entry for entry in TAKEDOWNS if entry["sequence"] in names]
@@ -206,12 +205,17 @@ def raw_parts(wildcards):
     }
 
 
+def repository_of(row):
+    """The repository of a row of the sheet: by its licence, and its batch where that has several."""
+    terms = LICENSES["licenses"][license_of(row.country, LICENSES)]
+    return batch_repository(terms["repository"], BATCHES.get(row.id, 1))
+
+
 def in_tree(repository):
-    spdx = REPOSITORIES[repository]
     return [
         sequence
         for sequence in SEQUENCES.values()
-        if license_of(sequence.country, LICENSES) == spdx
+        if repository_of(sequence) == repository
     ]
 
 

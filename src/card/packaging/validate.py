@@ -16,6 +16,7 @@ from card.packaging.checks.croissant import check_croissant, check_croissant_for
 from card.packaging.checks.files import check_files
 from card.packaging.checks.geometry import check_geometry
 from card.packaging.checks.licenses import check_licenses
+from card.packaging.checks.limits import check_limits
 from card.packaging.checks.members import check_members
 from card.packaging.checks.provenance import check_provenance
 from card.packaging.checks.splits import check_splits
@@ -50,7 +51,7 @@ def validate(
     ledger : rows of the split ledger, if the splits are to be checked against it.
     settings : of packaging; `load_dataset` adds loading all configs as a user would.
     """
-    findings = find_problems(tree, ledger=ledger, load=settings["load_dataset"])
+    findings = find_problems(tree, ledger=ledger, load=settings["load_dataset"], limits=settings["hub"])
     for line in findings:
         logger.error("%s", line)
     if findings:
@@ -69,15 +70,24 @@ def validate(
 
 
 def find_problems(
-    tree: Path, *, ledger: Sequence[Mapping[str, Any]] | None = None, load: bool = False
+    tree: Path,
+    *,
+    ledger: Sequence[Mapping[str, Any]] | None = None,
+    load: bool = False,
+    limits: Mapping[str, Any] | None = None,
 ) -> list[str]:
-    """All findings, one line each, in the order of the checks; none for a valid tree."""
+    """All findings, one line each, in the order of the checks; none for a valid tree.
+
+    limits : settings `packaging.hub`, if the tree has to keep within them.
+    """
     if not tree.is_dir():
         raise CardError("no release tree", where=tree)
     contents = read_contents(tree)
     findings = contents.findings + [line for check in CHECKS for line in check(contents)]
     if ledger is not None:
         findings += check_splits(contents, ledger)
+    if limits is not None:
+        findings += check_limits(contents, limits)
     if not findings:
         findings += check_croissant_format(contents)
     # An empty tree has no configs, and `datasets` would make one up.
