@@ -1,6 +1,7 @@
 """A drive of a few frames with all artifacts that packaging reads, written as the stages would."""
 
 import io
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -158,7 +159,7 @@ def assemble_tree(
         spdx=spdx,
         terms=terms,
         sequences=sequences,
-        release_folder=ROOT / "release",
+        release_folder=_pages(work, version),
         schemas=schema_folder(),
         split_report=None,
         takedowns=takedowns,
@@ -169,6 +170,16 @@ def assemble_tree(
         gates=[],
     )
     return out
+
+
+def _pages(work: Path, version: str) -> Path:
+    """The repository's templates with an entry for the version in the changelog."""
+    folder = Path(shutil.copytree(ROOT / "release", work / "pages", dirs_exist_ok=True))
+    changelog = folder / "CHANGELOG.md"
+    text = changelog.read_text()
+    if f"## {version}\n" not in text:
+        changelog.write_text(f"{text}\n## {version}\n\nA version.\n")
+    return folder
 
 
 def _write_bursts(recording: Path, results: Path, times: list[int], rng: np.random.Generator) -> None:

@@ -3,7 +3,7 @@
 import os
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
 from project import Project
@@ -176,6 +176,48 @@ def test_a_ledger_row_moves_only_its_sequence(built: Project) -> None:
         ledger, line, line.replace(line.split("\t")[3], "test" if "train" in line else "train", 1)
     ):
         assert built.plan() == chain(TOWN, "splits") | split_tree(GERMANY)
+
+
+def taken_down(built: Project, entry: str) -> AbstractContextManager[None]:
+    return built.changed(
+        "config/takedowns.yaml",
+        "takedowns: []",
+        f"takedowns:\n  - {{{entry}, reason: person, date: 2026-05-01}}",
+    )
+
+
+def test_a_takedown_of_frames_repacks_its_sequence_only(built: Project) -> None:
+    with taken_down(built, f"sequence: {TOWN}, frames: [2, 3]"):
+        assert built.plan() == {("package", TOWN)} | tree(GERMANY)
+
+
+def test_a_takedown_of_a_region_fills_the_anonymized_images_again(built: Project) -> None:
+    region = "region: {camera: camera_left, x_min: 0, y_min: 0, x_max: 16, y_max: 16}"
+    with taken_down(built, f"sequence: {TOWN}, frames: 2, {region}"):
+        assert built.plan() == chain(TOWN, "regions", "package") | tree(GERMANY)
+
+
+def test_a_takedown_of_a_sequence_reassembles_its_tree_only(built: Project) -> None:
+    with taken_down(built, f"sequence: {TOWN}"):
+        assert built.plan() == split_tree(GERMANY)
+
+
+def test_a_second_batch_is_a_tree_of_its_own(built: Project) -> None:
+    with built.changed("config/ledger/batches.tsv", "batch\n", f"batch\n{TOWN}\t2\n"):
+        assert built.plan() == split_tree(GERMANY, f"{GERMANY}-batch2")
+
+
+def test_a_takedown_of_an_unknown_sequence_stops_the_run(built: Project) -> None:
+    with taken_down(built, "sequence: de_nowhere, frames: 2"):
+        result = built.run("--dry-run")
+    assert result.returncode != 0
+    assert "takedown of an unknown sequence (found de_nowhere" in result.stdout
+
+
+def test_an_upload_is_only_planned_and_placeholders_are_refused(built: Project) -> None:
+    result = built.run("upload")
+    assert result.returncode != 0
+    assert "placeholder" in result.stdout
 
 
 def test_lost_records_are_refused(built: Project, tmp_path: Path) -> None:

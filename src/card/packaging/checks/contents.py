@@ -30,6 +30,7 @@ class Contents:
 
     tree: Path
     release: Row | None = None
+    changes: Row | None = None
     croissant: Row | None = None
     frames: dict[str, list[Row]] = field(default_factory=dict)  # by split file
     sequences: list[Row] = field(default_factory=list)
@@ -64,6 +65,7 @@ def read_contents(tree: Path) -> Contents:
         return [] if table is None else table.to_pylist()
 
     contents.release = attempt(read_json, "release.json", "release")
+    contents.changes = attempt(read_json, "changes.json", "changes")
     contents.croissant = attempt(read_json, "croissant.json", "croissant")
     contents.frames = {split: rows(f"metadata/frames-{split}.parquet", "release_frames") for split in SPLITS}
     contents.sequences = rows("metadata/sequences.parquet", "release_sequences")

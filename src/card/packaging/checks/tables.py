@@ -93,6 +93,14 @@ def _check_release(contents: Contents) -> Iterator[str]:
     release = contents.release
     if release is None:
         return
+    changelog = contents.tree / "CHANGELOG.md"
+    if (
+        changelog.is_file()
+        and f"## {release['version']}" not in changelog.read_text(encoding="utf-8").splitlines()
+    ):
+        yield f"CHANGELOG.md: no entry for version {release['version']}"
+    if contents.changes is not None and contents.changes["to"] != release["version"]:
+        yield f"changes.json: is about version {contents.changes['to']}, the release is {release['version']}"
     ids = [row["sequence"] for row in contents.sequences]
     if release["sequences"] != ids or len(set(ids)) != len(ids):
         yield "release.json: sequences are not those of metadata/sequences.parquet"
