@@ -40,5 +40,16 @@ def test_an_unknown_setting_is_refused(fresh: Project) -> None:
         assert "'voxels' was unexpected" in refused(fresh)
 
 
+def test_proposals_without_a_detector_or_a_sample_say_what_to_do(fresh: Project) -> None:
+    result = fresh.run("--dry-run", "proposals")
+    assert result.returncode != 0
+    assert "card: no detector: name one in config.yaml under proposals.detectors" in result.stdout
+    detector = "scale: tiny\nproposals: {detectors: {random: {model: road.onnx}}}"
+    with fresh.changed("config/config.yaml", "scale: tiny", detector):
+        result = fresh.run("--dry-run", "proposals")
+    assert result.returncode != 0
+    assert "card: no sample: draw it into config/annotation_sample.tsv" in result.stdout
+
+
 def test_an_unknown_sequence_on_the_command_line_is_refused(fresh: Project) -> None:
     assert "unknown sequence (found nowhere)" in refused(fresh, "--config", "sequences=nowhere")

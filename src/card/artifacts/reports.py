@@ -22,6 +22,8 @@ LIBRARIES = (
     "pyarrow",
     "small-gicp",
     "jpeglib",
+    "onnxruntime",
+    "pycocotools",
 )
 
 
