@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from card.geometry import matrix_from_quaternion
+from card.geometry import Trajectory, matrix_from_quaternion
 from card.simulation.centreline import winding
 from card.simulation.drives import TOWN
 from card.simulation.imu import GRAVITY_M_S2, RATE_HZ, ImuErrors, ideal_imu, imu_times, measured_imu
 from card.simulation.irregularities import Bump
-from card.simulation.rig import RIG_HEIGHT_M
+from card.simulation.rig import RIG_HEIGHT_M, ImuUnit
 from card.simulation.road import Road, hills
 from card.simulation.spectrum import roughness
 from card.simulation.suspension import HEAVE, QuarterCar, sprung
@@ -97,8 +97,43 @@ def test_imu_noise_has_its_density(trip) -> None:  # type: ignore[no-untyped-def
     _, _, path = trip
     times = imu_times(1_000_000_000, 8.0)
     errors = ImuErrors(gyro_bias=0.0, accel_bias=0.0, gyro_walk=0.0, accel_walk=0.0)
-    table = measured_imu(path, times, errors, np.random.default_rng(0))
+    table = measured_imu(path, times, errors, ImuUnit(), np.random.default_rng(0))
     rate, force = ideal_imu(path, times)
     for name, true, density in (("gyro", rate, errors.gyro_noise), ("accel", force, errors.accel_noise)):
         noise = np.column_stack([table[f"{name}_{axis}"] for axis in "xyz"]) - true
         assert noise.std() == pytest.approx(density * np.sqrt(RATE_HZ), rel=0.05)
+
+
+def test_scale_and_skew_of_the_unit_come_out_of_a_fit(trip) -> None:  # type: ignore[no-untyped-def]
+    _, _, path = trip
+    times = imu_times(1_000_000_000, 8.0)
+    unit = ImuUnit(
+        np.array([[1.002, 0.001, -0.0005], [0, 0.999, 0.0008], [0, 0, 1.001]]),
+        np.array([[0.998, 0.0004, 0.001], [0, 1.003, -0.0006], [0, 0, 1.0005]]),
+    )
+    silent = ImuErrors(*[0.0] * 6)
+    table = measured_imu(path, times, silent, unit, np.random.default_rng(0))
+    rate, force = ideal_imu(path, times)
+    for name, true, matrix in (("gyro", rate, unit.gyro), ("accel", force, unit.accel)):
+        measured = np.column_stack([table[f"{name}_{axis}"] for axis in "xyz"])
+        fitted = np.linalg.lstsq(true, measured, rcond=None)[0].T
+        np.testing.assert_allclose(fitted, matrix, atol=1e-6)
+
+
+@pytest.mark.parametrize("walks", [False, True])
+def test_allan_deviation_falls_with_noise_and_rises_with_the_walk(walks: bool) -> None:
+    seconds = np.arange(-2.0, 1503.0)
+    t_ns = np.round(seconds * 1e9).astype(np.int64)
+    path = Trajectory(t_ns, np.zeros((len(t_ns), 3)), np.tile([1.0, 0, 0, 0], (len(t_ns), 1)))
+    density, walk = 1e-4, 3e-5
+    errors = ImuErrors(gyro_noise=0.0 if walks else density, gyro_walk=walk if walks else 0.0)
+    times = imu_times(0, 1500.0)
+    table = measured_imu(path, times, errors, ImuUnit(), np.random.default_rng(4))
+    rate = np.column_stack([table[f"gyro_{axis}"] for axis in "xyz"])
+    for tau in (1.0, 4.0, 16.0):
+        length = round(tau * RATE_HZ)
+        means = rate[: len(rate) // length * length].reshape(-1, length, 3).mean(axis=1)
+        allan = np.sqrt(0.5 * np.mean(np.diff(means, axis=0) ** 2))
+        # IEEE Std 952, annex C: N / sqrt(tau) of white noise, K sqrt(tau / 3) of a random walk.
+        wanted = walk * np.sqrt(tau / 3) if walks else density / np.sqrt(tau)
+        assert allan == pytest.approx(wanted, rel=3.5 / np.sqrt(2 * means.size))

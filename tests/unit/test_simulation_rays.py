@@ -8,12 +8,10 @@ from numpy.typing import NDArray
 
 from card.geometry import Trajectory, apply, inverse
 from card.simulation.bodies import car, ego_body
+from card.simulation.echoes import NOISE_M, REACH_M, RESOLUTION_M
 from card.simulation.lidar import (
     CHANNEL_NS,
-    NOISE_M,
     PERIOD_NS,
-    REACH_M,
-    RESOLUTION_M,
     Lidar,
     burst_starts,
     columns,

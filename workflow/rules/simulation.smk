@@ -18,7 +18,7 @@ rule simulate_drive:
     # The longest way to a release: start it before what can wait.
     priority: 1
     params:
-        cfg=SEED,
+        cfg={**SEED, "dual_returns": SETTINGS["simulation"]["dual_returns"]},
         code=code("simulate_drive"),
         recording=subpath(output.recording, parent=True),
         truth=f"{TRUTH}/{{drive}}",

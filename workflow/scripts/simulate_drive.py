@@ -12,5 +12,6 @@ with logged(Path(snakemake.log[0])):
         truth=Path(snakemake.params.truth),
         scale=snakemake.params.cfg["scale"],
         seed=snakemake.params.cfg["seed"],
+        dual_returns=snakemake.params.cfg["dual_returns"],
         threads=snakemake.threads,
     )

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from card.errors import CardError
 from card.geometry import CameraModel, matrix_from_quaternion, to_json
-from card.simulation.rig import CAMERAS, WHEELS, LidarCorrections, Rig, built_rig
+from card.simulation.rig import CAMERAS, CHANNELS, WHEELS, LidarCorrections, Rig, built_rig
 from card.simulation.scales import scale_named
 
 Array = NDArray[np.float64]
@@ -32,6 +32,7 @@ _CENTRE = 1e-4
 _DISTORTION = (3e-4, 3e-4, 2e-5, 2e-5, 1e-4)
 _WHEEL_M = 1.5e-3
 _RANGE_M = 5e-4
+_CHANNEL_RANGE_M, _CHANNEL_RAD = 1e-3, np.radians(0.005)
 
 
 def day_of(session: str) -> tuple[str, str]:
@@ -85,7 +86,8 @@ def delivered_calibration(session: str, seed: int, scale: str, views: int) -> di
     """What the team estimated in a session of so many views: the truth with the error of a good estimate.
 
     Cameras, front and rear LiDAR err together by 0.01 degrees and 1 mm against the rig; the right camera
-    errs against the left by 0.003 degrees and 0.3 mm; the covariances say so.
+    errs against the left by 0.003 degrees and 0.3 mm; the covariances say so. A LiDAR's channels are known
+    to 1 mm and 0.005 degrees.
     """
     day, _ = day_of(session)
     rig = session_rig(session, seed, scale)
@@ -104,10 +106,7 @@ def delivered_calibration(session: str, seed: int, scale: str, views: int) -> di
         rig_from=rig_from,
         wheel_center_m={w: xyz + wheel_rng.normal(0, _WHEEL_M, 3) for w, xyz in rig.wheel_center_m.items()},
         wheel_contact_m={w: xyz + wheel_rng.normal(0, _WHEEL_M, 3) for w, xyz in rig.wheel_contact_m.items()},
-        lidar_corrections={
-            name: replace(c, range_offset_m=c.range_offset_m + float(wheel_rng.normal(0, _RANGE_M)))
-            for name, c in rig.lidar_corrections.items()
-        },
+        lidar_corrections={name: _estimated_lidar(c, wheel_rng) for name, c in rig.lidar_corrections.items()},
     )
     covariance = np.diag([_POSITION_M**2] * 3 + [_ANGLE_RAD**2] * 3)
     stereo = np.diag([_STEREO_M**2] * 3 + [_STEREO_ANGLE_RAD**2] * 3)
@@ -176,6 +175,15 @@ def _estimated_camera(camera: CameraModel, rng: np.random.Generator) -> CameraMo
         cx=camera.cx + _CENTRE * camera.width * float(error[2]),
         cy=camera.cy + _CENTRE * camera.width * float(error[3]),
         distortion=(k1, k2, p1, p2, k3),
+    )
+
+
+def _estimated_lidar(true: LidarCorrections, rng: np.random.Generator) -> LidarCorrections:
+    return LidarCorrections(
+        true.range_offset_m + float(rng.normal(0, _RANGE_M)),
+        true.channel_range_offset_m + rng.normal(0, _CHANNEL_RANGE_M, CHANNELS),
+        true.channel_elevation_offset_rad + rng.normal(0, _CHANNEL_RAD, CHANNELS),
+        true.channel_azimuth_offset_rad + rng.normal(0, _CHANNEL_RAD, CHANNELS),
     )
 
 

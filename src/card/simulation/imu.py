@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from card.geometry import Trajectory, matrix_from_quaternion
+from card.simulation.rig import ImuUnit
 
 Array = NDArray[np.float64]
 
@@ -48,10 +49,14 @@ def ideal_imu(path: Trajectory, t_ns: NDArray[np.int64]) -> tuple[Array, Array]:
 
 
 def measured_imu(
-    path: Trajectory, t_ns: NDArray[np.int64], errors: ImuErrors, rng: np.random.Generator
+    path: Trajectory, t_ns: NDArray[np.int64], errors: ImuErrors, unit: ImuUnit, rng: np.random.Generator
 ) -> dict[str, NDArray[np.generic]]:
-    """The IMU's table (schema ``imu``) at times t_ns (N,)."""
+    """The IMU's table (schema ``imu``) at times t_ns (N,).
+
+    What is measured is unit @ true + bias + noise; the bias starts anywhere and walks at random.
+    """
     rate, force = ideal_imu(path, t_ns)
+    rate, force = rate @ unit.gyro.T, force @ unit.accel.T
     columns: dict[str, NDArray[np.generic]] = {"t_ns": t_ns}
     for name, values, noise, bias, walk in (
         ("gyro", rate, errors.gyro_noise, errors.gyro_bias, errors.gyro_walk),

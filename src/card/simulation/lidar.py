@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from card.recording.burst import Burst
+from card.simulation.echoes import BEAM, PENCIL, echo_power, intensity, measured_range, returns_of
 from card.simulation.raycast import Scene, Tracer
 from card.simulation.rig import CHANNELS, LidarCorrections, lidar_elevations_rad
 from card.simulation.surfaces import LOOKS, Surface
@@ -14,10 +15,8 @@ from card.simulation.world import World
 Array = NDArray[np.float64]
 
 PERIOD_NS = 100_000_000
-#: Time between two channels of a column (XT32 manual), range resolution and noise (one sigma), and reach.
+#: Time between two channels of a column (XT32 manual).
 CHANNEL_NS = 1512
-RESOLUTION_M, NOISE_M, REACH_M = 0.004, 0.005, 120.0
-_NEAREST_M = 0.05
 _STEP_UNITS = 36000  # hundredths of a degree a revolution: what a packet can say
 _REFLECTIVITY = np.array([LOOKS[s].reflectivity for s in Surface])
 #: When in its period each unit passes azimuth zero: the spins are not synchronised.
@@ -64,10 +63,14 @@ def directions(azimuth: Array, elevation: Array) -> Array:
 
 
 class Lidar:
-    """One LiDAR of a world's car."""
+    """One LiDAR of a world's car.
 
-    def __init__(self, world: World, tracer: Tracer, ego: Scene, name: str) -> None:
+    dual : it reports the last return of a beam beside the strongest one.
+    """
+
+    def __init__(self, world: World, tracer: Tracer, ego: Scene, name: str, *, dual: bool = False) -> None:
         self.name, self._world, self._tracer, self._ego = name, world, tracer, ego
+        self._dual, self._rays = dual, BEAM if dual else PENCIL
         self._errors: LidarCorrections = world.rig.lidar_corrections[name]
 
     def scan(self, t_ns: int, number: int) -> tuple[Burst, BurstTruth]:
@@ -77,32 +80,52 @@ class Lidar:
         ring = np.tile(np.arange(CHANNELS), len(fired))
         offset = fired.repeat(CHANNELS) + ring * CHANNEL_NS
         measured = (azimuth.repeat(CHANNELS), lidar_elevations_rad()[ring])
-        true = directions(
+        true = (
             measured[0] + self._errors.channel_azimuth_offset_rad[ring],
             measured[1] + self._errors.channel_elevation_offset_rad[ring],
         )
-        rig_from_lidar = self._world.rig.rig_from[self.name]
-        in_rig = np.einsum("ij,nj->ni", rig_from_lidar[:3, :3], true)
-        origins, rays = self._in_world(t_ns + fired, rig_from_lidar[:3, 3], in_rig)
-        hits = self._tracer.cast(origins, rays, t_ns + offset)
-        own = self._ego.cast(np.broadcast_to(rig_from_lidar[:3, 3], in_rig.shape), in_rig).distance
+        distance, cosine, triangle = self._met(t_ns, fired, offset, true)
+        reflectivity = _REFLECTIVITY[self._tracer.all.surface[triangle]]
+        power = self._rays[:, 2:] * echo_power(distance, reflectivity, cosine)
+        back = returns_of(distance, power, noise, dual=self._dual)
 
-        distance = self._distance(hits.distance, ring, noise)
-        back = np.flatnonzero((distance > _NEAREST_M) & (distance < REACH_M) & (own > hits.distance))
-        triangle = hits.triangle[back]
-        surface = self._tracer.all.surface[triangle]
-        incidence = np.abs(np.sum(hits.normal[back] * rays[back], axis=1))
-        points = distance[back, None] * directions(measured[0][back], measured[1][back])
-        shine = 255 * _REFLECTIVITY[surface] * (0.3 + 0.7 * incidence)
+        beam, echo = back.beam, (back.ray, back.beam)
+        ranges = measured_range(distance[echo], ring[beam], self._errors, noise)
         burst = Burst(
             t_ns,
-            points,
-            np.clip(np.rint(shine), 1, 255).astype(np.uint8),
-            ring[back].astype(np.uint8),
-            offset[back].astype(np.uint32),
+            ranges[:, None] * directions(measured[0][beam], measured[1][beam]),
+            intensity(reflectivity[echo], cosine[echo]),
+            ring[beam].astype(np.uint8),
+            offset[beam].astype(np.uint32),
         )
-        dynamic = triangle >= self._tracer.static_triangles
-        return burst, BurstTruth(dynamic, hits.distance[back].astype(np.float32), surface)
+        hit = triangle[echo]
+        return burst, BurstTruth(
+            hit >= self._tracer.static_triangles,
+            distance[echo].astype(np.float32),
+            self._tracer.all.surface[hit],
+        )
+
+    def _met(
+        self, t_ns: int, fired: NDArray[np.int64], offset: NDArray[np.int64], angles: tuple[Array, Array]
+    ) -> tuple[Array, Array, NDArray[np.int32]]:
+        """What each ray of each beam meets (R, N): distance, cosine of incidence and triangle.
+
+        A distance is inf where there is nothing or our own car is in the way.
+        """
+        rig_from_lidar = self._world.rig.rig_from[self.name]
+        shape = len(self._rays), len(offset)
+        distance, cosine = np.empty(shape), np.empty(shape)
+        triangle = np.empty(shape, np.int32)
+        for k, (right, up, _) in enumerate(self._rays):
+            beams = directions(angles[0] + right, angles[1] + up)
+            in_rig = np.einsum("ij,nj->ni", rig_from_lidar[:3, :3], beams)
+            origins, rays = self._in_world(t_ns + fired, rig_from_lidar[:3, 3], in_rig)
+            hits = self._tracer.cast(origins, rays, t_ns + offset)
+            own = self._ego.cast(rig_from_lidar[:3, 3], in_rig).distance
+            distance[k] = np.where(own > hits.distance, hits.distance, np.inf)
+            cosine[k] = np.abs(np.einsum("ni,ni->n", hits.normal, rays))
+            triangle[k] = hits.triangle
+        return distance, cosine, triangle
 
     def _in_world(self, fired_ns: NDArray[np.int64], origin: Array, rays: Array) -> tuple[Array, Array]:
         """Origins and rays (N, 3) of columns fired at times (C,), given in the rig.
@@ -117,11 +140,3 @@ class Lidar:
         # Not matmul: threads of its library would cost more than they save.
         start = np.einsum("nij,j->ni", pose[..., :3], origin) + pose[..., 3]
         return start, np.einsum("nij,nj->ni", pose[..., :3], rays)
-
-    def _distance(
-        self, true: NDArray[np.float32], ring: NDArray[np.int64], rng: np.random.Generator
-    ) -> Array:
-        """Ranges (N,) as reported: biased, noisy and quantised; inf stays."""
-        bias = self._errors.range_offset_m + self._errors.channel_range_offset_m[ring]
-        noisy = true - bias + rng.normal(0, NOISE_M, len(true))
-        return np.asarray(np.where(np.isfinite(true), np.round(noisy / RESOLUTION_M) * RESOLUTION_M, np.inf))

@@ -27,7 +27,9 @@ class Run:
     numbers: range
 
 
-def write_sweeps(world: World, recording: Path, truth: Path, threads: int = 1) -> None:
+def write_sweeps(
+    world: World, recording: Path, truth: Path, threads: int = 1, *, dual_returns: bool = False
+) -> None:
     """All sweeps of both LiDARs, and for each what its points really met.
 
     threads : processes that share the work; the bytes do not depend on it.
@@ -36,7 +38,7 @@ def write_sweeps(world: World, recording: Path, truth: Path, threads: int = 1) -
         (recording / lidar).mkdir(parents=True)
         (truth / "bursts" / lidar).mkdir(parents=True)
     counts = {lidar: len(burst_starts(lidar, world.start_ns, world.scale.duration_s)) for lidar in LIDARS}
-    _record(world, recording, truth, _runs(counts), threads)
+    _record(_Recorder(world, recording, truth, dual_returns), _runs(counts), threads)
 
 
 def write_photographs(world: World, recording: Path, truth: Path, threads: int = 1) -> None:
@@ -47,7 +49,7 @@ def write_photographs(world: World, recording: Path, truth: Path, threads: int =
     for camera in CAMERAS:
         (recording / camera).mkdir(parents=True)
     runs = _runs({camera: len(exposures(world, camera)) for camera in CAMERAS})
-    write_labels(world, _record(world, recording, truth, runs, threads), recording, truth)
+    write_labels(world, _record(_Recorder(world, recording, truth), runs, threads), recording, truth)
 
 
 def _runs(counts: dict[str, int]) -> list[Run]:
@@ -58,9 +60,9 @@ def _runs(counts: dict[str, int]) -> list[Run]:
     ]
 
 
-def _record(world: World, recording: Path, truth: Path, runs: list[Run], threads: int) -> list[Shown]:
-    recorder = _Recorder(world, recording, truth)
-    done = progress(shared_out(recorder.record, runs, threads), f"{world.name} sensors", len(runs))
+def _record(recorder: "_Recorder", runs: list[Run], threads: int) -> list[Shown]:
+    label = f"{recorder.world.name} sensors"
+    done = progress(shared_out(recorder.record, runs, threads), label, len(runs))
     return [shown for found in done for shown in found]
 
 
@@ -69,6 +71,7 @@ class _Recorder:
     world: World
     recording: Path
     truth: Path
+    dual_returns: bool = False
 
     def record(self, run: Run) -> list[Shown]:
         if run.sensor in CAMERAS:
@@ -95,7 +98,9 @@ class _Recorder:
 
     @cached_property
     def _lidars(self) -> dict[str, Lidar]:
-        return {name: Lidar(self.world, self._tracer, self._ego, name) for name in LIDARS}
+        return {
+            name: Lidar(self.world, self._tracer, self._ego, name, dual=self.dual_returns) for name in LIDARS
+        }
 
     @cached_property
     def _photographer(self) -> Photographer:

@@ -35,6 +35,23 @@ class LidarCorrections:
     channel_azimuth_offset_rad: Array = field(default_factory=lambda: np.zeros(CHANNELS))
 
 
+#: One sigma of what a unit's channels are off by, and the most that its maker lets pass.
+_CHANNEL_RAD, _CHANNEL_RAD_MOST = np.radians(0.03), np.radians(0.09)
+_CHANNEL_M, _CHANNEL_M_MOST = 0.0025, 0.005
+#: With the channels' own, a range is off by less than the 1 cm that the maker states.
+_RANGE_M_MOST = 0.005
+#: One sigma of a MEMS unit's scale factors and of the angles between its axes.
+_IMU_SCALE, _IMU_SKEW_RAD = 1e-3, np.radians(0.03)
+
+
+@dataclass(frozen=True)
+class ImuUnit:
+    """What a unit makes of true rate and specific force, (3, 3) each: scale factors, axes that are askew."""
+
+    gyro: Array = field(default_factory=lambda: np.eye(3))
+    accel: Array = field(default_factory=lambda: np.eye(3))
+
+
 @dataclass(frozen=True)
 class Rig:
     """One build of the car.
@@ -43,6 +60,7 @@ class Rig:
     rig_from : ``rig_from_<sensor>`` (4, 4) by sensor (two cameras, two LiDARs).
     wheel_center_m, wheel_contact_m : (3,) in ``rig`` at rest, by wheel.
     lidar_corrections : by LiDAR.
+    imu : what the IMU's axes are like.
     """
 
     cameras: dict[str, CameraModel]
@@ -50,6 +68,7 @@ class Rig:
     wheel_center_m: dict[str, Array]
     wheel_contact_m: dict[str, Array]
     lidar_corrections: dict[str, LidarCorrections]
+    imu: ImuUnit = field(default_factory=ImuUnit)
 
 
 def lidar_elevations_rad() -> Array:
@@ -102,10 +121,34 @@ def built_rig(day: str, seed: int, width: int, height: int) -> Rig:
         rig_from={name: pose @ _misalignment(rng) for name, pose in drawn.rig_from.items()},
         wheel_center_m={name: xyz + rng.normal(0, 0.003, 3) for name, xyz in drawn.wheel_center_m.items()},
         wheel_contact_m={name: xyz + rng.normal(0, 0.003, 3) for name, xyz in drawn.wheel_contact_m.items()},
-        lidar_corrections={
-            name: LidarCorrections(range_offset_m=float(rng.uniform(-0.008, 0.008))) for name in LIDARS
-        },
+        lidar_corrections={name: _lidar_unit(name, seed, rng) for name in LIDARS},
+        imu=_imu_unit(seed),
     )
+
+
+def _lidar_unit(name: str, seed: int, day: np.random.Generator) -> LidarCorrections:
+    """A unit whose channels are its own for life; its common range offset changes from day to day."""
+    unit = np.random.default_rng([seed, *name.encode()])
+
+    def off(sigma: float, most: float) -> Array:
+        return np.clip(unit.normal(0, sigma, CHANNELS), -most, most)
+
+    return LidarCorrections(
+        float(day.uniform(-_RANGE_M_MOST, _RANGE_M_MOST)),
+        off(_CHANNEL_M, _CHANNEL_M_MOST),
+        off(_CHANNEL_RAD, _CHANNEL_RAD_MOST),
+        off(_CHANNEL_RAD, _CHANNEL_RAD_MOST),
+    )
+
+
+def _imu_unit(seed: int) -> ImuUnit:
+    unit = np.random.default_rng([seed, *b"imu"])
+
+    def askew() -> Array:
+        scale = np.diag(1 + unit.normal(0, _IMU_SCALE, 3))
+        return np.asarray(scale + np.triu(unit.normal(0, _IMU_SKEW_RAD, (3, 3)), 1))
+
+    return ImuUnit(askew(), askew())
 
 
 def _camera_pose(x: float, pitch_down: float) -> Array:

@@ -8,9 +8,11 @@ import numpy as np
 import yaml
 
 from card.artifacts import atomic_folder, check, write_arrays, write_table
+from card.errors import CardError
 from card.geometry import Trajectory
 from card.recording.paths import imu_path
 from card.simulation.deliveries import as_bag, write_trajectory
+from card.simulation.drives import drive_named
 from card.simulation.footprint import wheel_contacts
 from card.simulation.frame_truth import write_frame_truth
 from card.simulation.imu import ImuErrors, imu_times, measured_imu
@@ -20,7 +22,14 @@ from card.simulation.world import World, build_world
 
 
 def simulate_drive(
-    drive: str, *, recording: Path, truth: Path, scale: str, seed: int, threads: int = 1
+    drive: str,
+    *,
+    recording: Path,
+    truth: Path,
+    scale: str,
+    seed: int,
+    dual_returns: bool = False,
+    threads: int = 1,
 ) -> None:
     """Write the raw recording of a demo drive to ``recording`` and its truth to ``truth``.
 
@@ -29,18 +38,22 @@ def simulate_drive(
     drive : id of one of `drives.DRIVES`.
     scale : ``tiny``, ``demo`` or ``full``.
     seed : makes the world; the same seed gives the same bytes.
+    dual_returns : LiDARs report the last return of a beam beside the strongest one.
     threads : processes that share the sensors' work; the bytes do not depend on it.
 
     Raises
     ------
     CardError
-        For an unknown drive or scale, or if a folder cannot be written; a folder appears whole or not at all.
+        For an unknown drive or scale, for dual returns of a drive that is delivered as a bag, or if a folder
+        cannot be written; a folder appears whole or not at all.
     """
+    if dual_returns and drive_named(drive).bag:
+        raise CardError("a simulated bag holds single returns", where=drive, found="simulation.dual_returns")
     world = build_world(drive, scale, seed)
     with atomic_folder(truth) as truth_part, atomic_folder(recording) as recording_part:
         native = recording_part / "native" if world.drive.bag else recording_part
         path = write_motion(world, native, truth_part)
-        write_sweeps(world, native, truth_part, threads)
+        write_sweeps(world, native, truth_part, threads, dual_returns=dual_returns)
         write_photographs(world, native, truth_part, threads)
         write_description(world, native)
         if world.drive.bag:
@@ -52,7 +65,8 @@ def simulate_drive(
 def write_motion(world: World, recording: Path, truth: Path) -> Trajectory:
     """IMU table, true trajectory, wheels, frames and mesh; the true trajectory at IMU rate is returned."""
     times = imu_times(world.start_ns, world.scale.duration_s)
-    write_table(imu_path(recording), measured_imu(world.path, times, ImuErrors(), world.rng("imu")), "imu")
+    measured = measured_imu(world.path, times, ImuErrors(), world.rig.imu, world.rng("imu"))
+    write_table(imu_path(recording), measured, "imu")
     rows = np.searchsorted(world.path.t_ns, times)
     path = Trajectory(times, world.path.translation_m[rows], world.path.rotation_wxyz[rows])
     write_table(truth / "trajectory.parquet", path.to_table(), "trajectory")
