@@ -17,8 +17,8 @@ from card.recording.description import read_description
 from card.recording.laz import read_burst
 from card.recording.paths import LIDARS, list_bursts, list_images, stamp_of
 from card.simulation import board
-from card.simulation.session_drive import DURATION_S
-from card.simulation.sessions import VIEWS, simulate_session
+from card.simulation.scales import SCALES
+from card.simulation.sessions import simulate_session
 from card.simulation.survey import NOISE_M, POSES, SURVEYS, simulate_survey
 
 SESSION = "2026-04-14-start"
@@ -85,7 +85,7 @@ def test_board_returns_lie_on_the_board_once_corrected(demo: tuple[Path, Path]) 
     rig_from_lidar = from_json(calibration["extrinsics"]["rig_from_lidar_front"])
     views = read_json(truth / "board_poses.json", "board_poses")["views"]
     bursts = list_bursts(folder, "lidar_front")
-    assert len(bursts) == len(views) == VIEWS["demo"]
+    assert len(bursts) == len(views) == SCALES["demo"].board_views
     raw, corrected = [], []
     for path, view in zip(bursts, views, strict=True):
         burst = read_burst(path)
@@ -162,7 +162,7 @@ def test_the_drive_s_points_lie_on_its_world_by_the_session_s_calibration(
     path = Trajectory.from_table(read_table(truth / "drive" / "trajectory.parquet", "trajectory"))
     bursts = list_bursts(folder / "drive", lidar)
     assert set(read_description(folder / "drive")["sensors"]) == {*LIDARS, "imu"}
-    assert len(bursts) == round(DURATION_S["demo"] * 10) - 1
+    assert len(bursts) == round(SCALES["demo"].session_s * 10) - 1
     burst = read_burst(bursts[-1])
     ranges = np.linalg.norm(burst.points, axis=1, keepdims=True)
     corrected = correct_points(burst.points, burst.ring, calibration["lidar_corrections"][lidar])
@@ -178,16 +178,16 @@ def test_the_drive_s_points_lie_on_its_world_by_the_session_s_calibration(
     assert np.mean(distance < 0.02) > 0.97
 
 
-def _session_and_survey(root: Path, seed: int) -> dict[str, bytes]:
-    simulate_session(SESSION, folder=root / "s", truth=root / "t", scale="tiny", seed=seed)
+def _session_and_survey(root: Path, seed: int, threads: int) -> dict[str, bytes]:
+    simulate_session(SESSION, folder=root / "s", truth=root / "t", scale="tiny", seed=seed, threads=threads)
     simulate_survey("2026-04-14", folder=root / "v", truth=root / "u", scale="tiny", seed=seed)
     return {str(p.relative_to(root)): p.read_bytes() for p in sorted(root.rglob("*")) if p.is_file()}
 
 
-def test_same_seed_same_bytes(tmp_path: Path) -> None:
-    first = _session_and_survey(tmp_path / "a", 1)
+def test_same_seed_same_bytes_by_however_many_processes(tmp_path: Path) -> None:
+    first = _session_and_survey(tmp_path / "a", 1, threads=1)
     assert {"s/ego_mask.png", "s/drive/imu.parquet", "v/survey-3/points.csv"} < first.keys()
-    assert first == _session_and_survey(tmp_path / "b", 1)
+    assert first == _session_and_survey(tmp_path / "b", 1, threads=2)
 
 
 def test_another_seed_makes_another_survey(tmp_path: Path) -> None:

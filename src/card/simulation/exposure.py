@@ -13,9 +13,9 @@ Image = NDArray[np.float32]
 #: Electrons of a full well at gain 1 and of the read noise (one sigma): a 3.45 um global shutter sensor.
 FULL_WELL_E, READ_NOISE_E = 10_000.0, 2.5
 _LEVELS = 4096
-_GAMMA = 2.2
+GAMMA = 2.2
 JPEG_QUALITY = 92
-_TONES = np.rint(255 * (np.arange(_LEVELS) / (_LEVELS - 1)) ** (1 / _GAMMA)).astype(np.uint8)
+_TONES = np.rint(255 * (np.arange(_LEVELS) / (_LEVELS - 1)) ** (1 / GAMMA)).astype(np.uint8)
 
 
 @dataclass(frozen=True)

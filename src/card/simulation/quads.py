@@ -9,8 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from card.geometry import CameraModel, inverse
+from card.simulation.exposure import GAMMA
+from card.simulation.lens import lens_of
 
 Array = NDArray[np.float64]
+
+#: Light (256,) of an 8 bit tone.
+LIGHT = ((np.arange(256) / 255) ** GAMMA).astype(np.float32)
 
 
 @dataclass(frozen=True)
@@ -19,7 +24,7 @@ class Quad:
 
     rig_from_quad : (4, 4); the rectangle spans x in [0, width], y in [0, height] at z = 0.
     size_m : width and height, metres.
-    texture : (H, W, 3) uint8 RGB laid over the whole rectangle, first row at y = 0.
+    texture : (H, W, 3) uint8 RGB, gamma 2.2, laid over the whole rectangle, first row at y = 0.
     intensity : reflectivity the LiDAR reports, 0 to 255.
     """
 
@@ -58,20 +63,19 @@ class QuadView:
     def __init__(self, camera: CameraModel, rig_from_camera: Array, samples: int = 3) -> None:
         self.camera = camera
         self.rig_from_camera = rig_from_camera
-        v, u = np.mgrid[0 : camera.height, 0 : camera.width]
-        rays = camera.rays(np.stack([u, v], axis=-1))[..., :2].astype(np.float32)
-        self._rays = np.moveaxis(rays, -1, 0)
+        self.lens = lens_of(camera)
+        self._rays = np.moveaxis(self.lens.rays, -1, 0)
         self._along = np.gradient(self._rays, axis=2), np.gradient(self._rays, axis=1)
         steps = (np.arange(samples) + 0.5) / samples - 0.5
         self._offsets = [(du, dv) for dv in steps for du in steps]
 
     def draw(self, quads: Sequence[Quad], onto: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
-        """The image (height, width, 3) float32, 0 to 255, of quads listed from far to near.
+        """The light (height, width, 3) float32, 1 for white, of quads listed from far to near.
 
         onto : a picture that lies behind them; it is left as it is. Without one the sky is grey.
         """
         shape = (self.camera.height, self.camera.width, 3)
-        image = np.full(shape, 170, np.float32) if onto is None else onto.copy()
+        image = np.full(shape, LIGHT[170], np.float32) if onto is None else onto.copy()
         for quad in quads:
             self._draw_one(quad, image)
         return image
@@ -91,7 +95,7 @@ class QuadView:
             with np.errstate(divide="ignore", invalid="ignore"):
                 x, y = x / inverse_depth, y / inverse_depth
             inside = ((inverse_depth > 0) & _inside(quad, x, y))[..., None]
-            colour += np.where(inside, _sample(quad, x, y), 0)
+            colour += np.where(inside, LIGHT[_sample(quad, x, y)], np.float32(0))
             cover += inside
         count = len(self._offsets)
         image[window] = image[window] * (1 - cover / count) + colour / count

@@ -13,6 +13,8 @@ class Scale:
     columns : firings of all 32 channels a LiDAR revolution.
     duration_s : time LiDARs and IMU run.
     camera_start_s, camera_duration_s : the cameras' excerpt; they run at 10 Hz.
+    board_views : poses of the board in a calibration session.
+    session_s : time LiDARs and IMU run in a session's drive, whose round takes half a minute.
     """
 
     name: str
@@ -22,6 +24,8 @@ class Scale:
     duration_s: float
     camera_start_s: float
     camera_duration_s: float
+    board_views: int
+    session_s: float
 
     def cut(self, duration_s: float) -> "Scale":
         """The same scale, nothing running longer than ``duration_s`` from the drive's start."""
@@ -32,9 +36,9 @@ class Scale:
 SCALES = {
     scale.name: scale
     for scale in (
-        Scale("tiny", 140, 140, 90, 6.0, 2.0, 0.5),
-        Scale("demo", 562, 563, 200, 45.0, 8.0, 5.0),
-        Scale("full", 2248, 2252, 2000, 120.0, 5.0, 80.0),
+        Scale("tiny", 140, 140, 90, 6.0, 2.0, 0.5, 3, 0.5),
+        Scale("demo", 562, 563, 200, 45.0, 8.0, 5.0, 12, 4.0),
+        Scale("full", 2248, 2252, 2000, 120.0, 5.0, 80.0, 500, 60.0),
     )
 }
 

@@ -10,9 +10,6 @@ from card.simulation.scales import scale_named
 from card.simulation.simulate import write_description, write_motion
 from card.simulation.world import world_of
 
-DURATION_S = {"tiny": 0.5, "demo": 4.0, "full": 60.0}
-"""How long LiDARs and IMU run; a round takes half a minute."""
-
 # Time of day, h UTC.
 _HOURS = {"start": 8.75, "mid": 12.75, "end": 17.75}
 
@@ -38,7 +35,8 @@ def write_session_drive(
         bump_spacing=20.0,
         house_depth=6.0,
     )
-    size = replace(scale_named(scale), duration_s=DURATION_S[scale], camera_start_s=0.0)
+    size = scale_named(scale)
+    size = replace(size, duration_s=size.session_s, camera_start_s=0.0)
     world = world_of(f"{session}-drive", drive, size, seed)
     folder.mkdir(parents=True)
     truth.mkdir(parents=True)

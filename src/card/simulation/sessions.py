@@ -1,5 +1,7 @@
 """A calibration session: the board before a standing car, a short drive, and what the team made of it."""
 
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -20,12 +22,12 @@ from card.simulation.calibrations import (
     true_calibration,
 )
 from card.simulation.ego import ego_pixels
+from card.simulation.forked import shared_out
 from card.simulation.lidar import PERIOD_NS
+from card.simulation.quads import Quad
+from card.simulation.rig import Rig
 from card.simulation.scales import scale_named
 from card.simulation.session_drive import write_session_drive
-
-VIEWS = {"tiny": 3, "demo": 12, "full": 500}
-"""Board views a session."""
 
 _TILT_DEG = 16.0
 _VIEW_NS = 2_000_000_000
@@ -41,26 +43,16 @@ def simulate_session(
     folder : gets board.yaml, camera_left|camera_right/<t_ns>.jpg, lidar_front/<t_ns>.laz, calibration.json
         (what the team delivers), ego_mask.png, drive/ (both LiDARs, the IMU, recording.yaml).
     truth : gets calibration.json, board_poses.json and the drive's truth in drive/.
-    threads : processes that share the drive's work; the bytes do not depend on it.
+    threads : processes that share the work; the bytes do not depend on it.
     """
-    size, rig = scale_named(scale), session_rig(session, seed, scale)
-    rng = np.random.default_rng([seed, *session.encode()])
-    behind = surroundings(rng)
-    cameras = BoardCameras(rig, behind)
-    views: list[dict[str, Any]] = []
+    rig, count = session_rig(session, seed, scale), scale_named(scale).board_views
     with atomic_folder(truth) as truth_partial, atomic_folder(folder) as partial:
         write_board_yaml(partial)
         (partial / "lidar_front").mkdir()
-        for number in progress(range(VIEWS[scale]), f"{session} board"):
-            rig_from_board = place_board(rig, cameras.ego, rng, tilt_deg=_TILT_DEG)
-            shown = board_quads(rig_from_board)
-            t_ns = session_start_ns(session) + number * _VIEW_NS
-            cameras.photograph(partial, shown, t_ns, rng)
-            start_ns = t_ns - _SWEEP_LEAD_NS
-            burst = sweep(rig, [*behind, *shown], size.columns, number, start_ns, rng)
-            write_burst(partial / "lidar_front" / f"{burst.t_ns}.laz", burst)
-            views.append({"folder": ".", "t_ns": t_ns, "rig_from_board": to_json(rig_from_board)})
-        calibration = delivered_calibration(session, seed, scale, views=VIEWS[scale])
+        boards = _Boards(session, seed, scale, rig, partial)
+        done = shared_out(boards.show, range(count), threads)
+        views = list(progress(done, f"{session} board", count))
+        calibration = delivered_calibration(session, seed, scale, views=count)
         write_json(partial / "calibration.json", calibration, "calibration")
         cv2.imwrite(str(partial / "ego_mask.png"), delivered_mask(calibration))
         write_json(truth_partial / "calibration.json", true_calibration(session, seed, scale), "calibration")
@@ -74,6 +66,37 @@ def simulate_session(
             seed=seed,
             threads=threads,
         )
+
+
+@dataclass
+class _Boards:
+    """The board before the standing car, in one pose after the other; each view is random on its own."""
+
+    session: str
+    seed: int
+    scale: str
+    rig: Rig
+    folder: Path
+
+    def show(self, number: int) -> dict[str, Any]:
+        """Photograph and scan view ``number``; its entry among the true board poses."""
+        rng = np.random.default_rng([self.seed, number, *self.session.encode()])
+        rig_from_board = place_board(self.rig, self._cameras.ego, rng, tilt_deg=_TILT_DEG)
+        shown = board_quads(rig_from_board)
+        t_ns = session_start_ns(self.session) + number * _VIEW_NS
+        self._cameras.photograph(self.folder, shown, t_ns, rng)
+        columns, start_ns = scale_named(self.scale).columns, t_ns - _SWEEP_LEAD_NS
+        burst = sweep(self.rig, [*self._behind, *shown], columns, number, start_ns, rng)
+        write_burst(self.folder / "lidar_front" / f"{burst.t_ns}.laz", burst)
+        return {"folder": ".", "t_ns": t_ns, "rig_from_board": to_json(rig_from_board)}
+
+    @cached_property
+    def _behind(self) -> list[Quad]:
+        return surroundings(np.random.default_rng([self.seed, *self.session.encode()]))
+
+    @cached_property
+    def _cameras(self) -> BoardCameras:
+        return BoardCameras(self.rig, self._behind)
 
 
 def delivered_mask(calibration: dict[str, Any]) -> NDArray[np.uint8]:
