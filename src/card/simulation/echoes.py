@@ -80,7 +80,8 @@ def returns_of(distance: Array, power: Array, rng: np.random.Generator, *, dual:
     found = [Returns(beams[some], strongest[some])]
     if dual:
         last = np.argmax(np.where(noticed, distance, -1.0), axis=0)
-        other = some & (distance[last, beams] - distance[strongest, beams] >= _APART_M)
+        with np.errstate(invalid="ignore"):
+            other = some & (distance[last, beams] - distance[strongest, beams] >= _APART_M)
         found.append(Returns(beams[other], last[other]))
     beam, ray = (np.concatenate([getattr(f, name) for f in found]) for name in ("beam", "ray"))
     order = np.argsort(beam, kind="stable")
