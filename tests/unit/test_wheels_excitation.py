@@ -75,7 +75,7 @@ def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     rng = np.random.default_rng(0)
     bundle = true_calibration("2026-04-14-start", 1, "tiny")
     for corrections in bundle["lidar_corrections"].values():
-        corrections["range_offset_m"] = 0.0
+        corrections |= {name: 0.0 if name == "range_offset_m" else [0.0] * 32 for name in corrections}
     write_json(folder / "calibration.json", bundle, "calibration")
     lidar = {"model": "XT32", "clock": "synchronised", "deskewed": False}
     description = {"id": "drive", "rig": "r", "day": "2026-04-14", "place": "p", "country": "DE"}
