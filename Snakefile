@@ -36,6 +36,13 @@ include: "workflow/rules/report.smk"
 include: "workflow/rules/benchmark.smk"
 
 
+# They write into the configuration or to the Hub, or only show: not for a node of a cluster.
+localrules:
+    assign_splits,
+    assign_batches,
+    upload,
+
+
 rule release:
     default_target: True
     input:

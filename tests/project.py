@@ -24,7 +24,8 @@ class Project:
         """Run snakemake; its output, both streams together, is in ``stdout``."""
         environment = {
             **os.environ,
-            "PYTHONPATH": str(self.root / "src"),
+            # What the caller has on its path stays behind the copy's own library.
+            "PYTHONPATH": os.pathsep.join([str(self.root / "src"), os.environ.get("PYTHONPATH", "")]),
             "OMP_NUM_THREADS": "1",
             "XDG_CACHE_HOME": str(self.root / ".cache"),
         }

@@ -150,6 +150,7 @@ def assemble_tree(
     takedowns: Any = (),
     previous: Path | None = None,
     version: str = "0.1.0",
+    split_report: Path | None = None,
 ) -> Path:
     """Assemble packages into a tree with the repository's own templates."""
     terms = terms or LICENSES["licenses"][spdx]
@@ -161,7 +162,7 @@ def assemble_tree(
         sequences=sequences,
         release_folder=_pages(work, version),
         schemas=schema_folder(),
-        split_report=None,
+        split_report=split_report,
         takedowns=takedowns,
         previous=previous,
         out=out,

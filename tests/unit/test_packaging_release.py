@@ -23,7 +23,7 @@ from packaging_drive import (
     write_splits,
 )
 
-from card.artifacts import read_json, read_table, write_table
+from card.artifacts import Figure, read_json, read_table, write_report, write_table
 from card.cli import main
 from card.errors import CardError
 from card.packaging.pack import pack_sequence
@@ -287,3 +287,28 @@ def test_command_line(tree: Path, tmp_path: Path, capsys: pytest.CaptureFixture[
     assert "1 sequences, 6 frames" in capsys.readouterr().out
     assert main(["validate", str(tmp_path / "nothing")]) == 1
     assert capsys.readouterr().err.startswith("card: ")
+
+
+@pytest.mark.parametrize(
+    ("mode", "says"), [("group", "kept in one split"), ("frame", "neighbours are in different")]
+)
+def test_the_card_tells_what_the_splits_are_worth(tmp_path: Path, mode: str, says: str) -> None:
+    inputs = write_drive(tmp_path, sheet_row())
+    pack_sequence(**inputs)
+    splits = write_splits(tmp_path / "splits.parquet", ["train"] * FRAMES)
+    report = tmp_path / "splits.report.json"
+    write_report(
+        report,
+        stage="split_report",
+        settings={"mode": mode},
+        inputs={},
+        counts={"test_unknown": 2},
+        figures=[Figure("leak_m_p5", 41.6, "m", "x"), Figure("stratum_deviation", 0.0312, "1", "x")],
+    )
+    item = {"id": "de_test", "package": inputs["out"], "splits": splits}
+    tree = assemble_tree(tmp_path, [item], split_report=report)
+    card = " ".join((tree / "README.md").read_text().split())
+    assert says in card
+    assert "95 % of the test frames lie 42 m or more from the nearest training frame. 2 test frames" in card
+    assert "off their targets by 0.031 on average" in card
+    assert find_problems(tree) == []

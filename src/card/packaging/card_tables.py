@@ -7,6 +7,11 @@ from typing import Any
 from card.packaging.reader import SPLITS
 
 Row = Mapping[str, Any]
+MODES = {
+    "group": "Frames that were taken near each other are kept in one split; where a stratum (topography and "
+    "place) would have too few groups, drives are cut into blocks with gaps between them. ",
+    "frame": "Every sampled frame was assigned by itself, so neighbours are in different splits. ",
+}
 TOPOGRAPHIES = ("positive", "negative", "off_road", "none", "unknown")
 
 
@@ -25,7 +30,8 @@ def counts(release: Row, sequences: Sequence[Row]) -> str:
 def split_figures(report: Mapping[str, Any] | None) -> str:
     """What the splits are worth, as far as it is known."""
     if report is None:
-        return "There are no frames to split."
+        return "How near test frames are to training frames was not measured."
+    mode = report["settings"]["mode"]
     value = {figure["name"]: figure["value"] for figure in report["figures"]}
     counts = report["counts"]
     unknown = (
@@ -41,7 +47,7 @@ def split_figures(report: Mapping[str, Any] | None) -> str:
         if value["stratum_deviation"] is not None
         else ""
     )
-    return near + (unknown if counts["test_unknown"] else "") + balance
+    return MODES[mode] + near + (unknown if counts["test_unknown"] else "") + balance
 
 
 def sequence_table(sequences: Sequence[Row]) -> str:
