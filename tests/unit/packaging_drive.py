@@ -164,7 +164,7 @@ def assemble_tree(
         schemas=schema_folder(),
         split_report=split_report,
         takedowns=takedowns,
-        previous=previous,
+        records=[previous] if previous else [],
         out=out,
         report=out.with_name(f"{out.name}.report.json"),
         settings=SETTINGS | {"release": SETTINGS["release"] | {"version": version}},

@@ -9,7 +9,7 @@ from packaging_drive import FRAMES, assemble_tree, sheet_row, write_drive, write
 from card.artifacts import read_json
 from card.errors import CardError
 from card.packaging.pack import pack_sequence
-from card.packaging.versions import latest_record, next_version
+from card.packaging.versions import latest_records, next_version
 
 STATES = ["train", "unassigned"] * 3
 
@@ -80,11 +80,20 @@ def test_versions_rise_by_their_parts() -> None:
 
 
 def test_the_last_record_is_the_highest_version_below(tmp_path: Path) -> None:
-    assert latest_record(tmp_path, "card-germany", "1.0.0") is None
+    assert latest_records(tmp_path, "card-germany", "1.0.0") == []
     for version in ("0.9.0", "0.10.0", "1.0.0"):
         folder = tmp_path / "card-germany" / version
         folder.mkdir(parents=True)
         (folder / "release.json").write_text("{}")
-    found = latest_record(tmp_path, "card-germany", "1.0.0")
-    assert found is not None
-    assert found.name == "0.10.0"
+    found = latest_records(tmp_path, "card-germany", "1.0.0")
+    assert [path.name for path in found] == ["0.10.0", "1.0.0"]
+    assert [path.name for path in latest_records(tmp_path, "card-germany", "2.0.0")] == ["1.0.0"]
+
+
+def test_a_version_that_was_sent_stands(old: Path, tmp_path: Path) -> None:
+    again = assemble_tree(tmp_path, [item(tmp_path)], version="1.2.3", previous=old)
+    assert (again / "SHA256SUMS").read_bytes() == (old / "SHA256SUMS").read_bytes()
+    with pytest.raises(CardError, match=r"call for a minor version \(found 1.2.3, wanted at least 1.3.0"):
+        assemble_tree(
+            tmp_path, [item(tmp_path / "x"), item(tmp_path / "y", "de_two")], version="1.2.3", previous=old
+        )

@@ -13,7 +13,7 @@ from card.packaging.batches import batch_repository, read_batches
 from card.packaging.licenses import license_of, read_licenses
 from card.packaging.summary import summarize
 from card.packaging.takedowns import read_takedowns, whole_sequences
-from card.packaging.versions import latest_record
+from card.packaging.versions import latest_records
 from card.recording.description import check_identity
 from card.recording.fingerprint import fingerprint
 from card.recording.sheet import read_sequences

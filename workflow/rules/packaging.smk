@@ -64,7 +64,7 @@ rule assemble:
         splits=tree_splits,
         split_report=rules.split_report.output.report,
         schemas=sorted(os.path.relpath(path) for path in schema_folder().glob("*.json")),
-        previous=last_release,
+        records=earlier_releases,
         changelog=str(TEMPLATES / "CHANGELOG.md"),
         templates=sorted(str(path) for path in TEMPLATES.rglob("*") if path.is_file()),
     output:

@@ -149,13 +149,16 @@ def tree_takedowns(wildcards):
     return [entry for entry in TAKEDOWNS if entry["sequence"] in names]
 
 
-def last_release(wildcards):
-    """Files of the record of the last release of a repository; none before the first, nor for a subset."""
+def earlier_releases(wildcards):
+    """Files of the records of earlier releases of a repository; none for a subset, which is no release."""
     version = SETTINGS["packaging"]["release"]["version"]
-    record = latest_record(Path(SETTINGS["records"]), wildcards.repository, version)
-    if SUBSET or record is None:
-        return []
-    return sorted(str(path) for path in record.rglob("*") if path.is_file())
+    records = latest_records(Path(SETTINGS["records"]), wildcards.repository, version)
+    return [
+        str(path)
+        for record in ([] if SUBSET else records)
+        for path in sorted(record.rglob("*"))
+        if path.is_file()
+    ]
 
 
 def stages_of(sequence):

@@ -6,7 +6,7 @@ from card.artifacts import logged
 from card.artifacts.schemas import schema_folder
 from card.packaging.assemble import assemble
 
-previous = [Path(path) for path in snakemake.input.previous]
+records = [Path(path).parent for path in snakemake.input.records if path.endswith("release.json")]
 splits = {Path(path).parent.name: Path(path) for path in snakemake.input.splits}
 
 with logged(Path(snakemake.log[0])):
@@ -22,7 +22,7 @@ with logged(Path(snakemake.log[0])):
         schemas=schema_folder(),
         split_report=Path(snakemake.input.split_report),
         takedowns=snakemake.params.takedowns,
-        previous=next((path.parent for path in previous if path.name == "release.json"), None),
+        records=records,
         out=Path(snakemake.params.out),
         report=Path(snakemake.output.report),
         **snakemake.params.cfg,

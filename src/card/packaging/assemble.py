@@ -57,7 +57,7 @@ def assemble(
     schemas: Path,
     split_report: Path | None,
     takedowns: Sequence[Mapping[str, Any]],
-    previous: Path | None,
+    records: Sequence[Path],
     out: Path,
     report: Path,
     settings: Mapping[str, Any],
@@ -73,7 +73,8 @@ def assemble(
     split_report : report of the splits' leakage and balance, None without.
 
     takedowns : entries of `read_takedowns` about sequences of this tree.
-    previous : record of the last release of this repository (`versions.RECORDED`), None before the first.
+    records : records of earlier releases of this repository as of `latest_records`: the last, and that of
+        this version if it was sent before. What is different from the last is stated in `changes.json`.
 
     CardError when anything in a package is under another licence than the tree, something retracted is
     there, a released frame moved to another split, or the version does not tell what changed.
@@ -85,7 +86,9 @@ def assemble(
             _check_license(item["id"], Path(item["package"]), spdx)
             hashes |= _place(item["id"], Path(item["package"]), tree)
         rows = [read_json(Path(item["package"]) / "sequence.json", "release_sequence") for item in ordered]
-        before = read_records(previous) if previous else None
+        earlier = [read_records(record) for record in records]
+        version = settings["release"]["version"]
+        before = next((found for found in earlier if found.about["version"] != version), None)
         stones = [
             row
             for item in ordered
@@ -96,7 +99,7 @@ def assemble(
         retracted = retraction_rows(
             [*stones, *whole_tombstones(takedowns)],
             before.retractions if before else [],
-            settings["release"]["version"],
+            version,
         )
         frames = write_metadata(tree, ordered, rows, retracted)
         mini = mini_columns(Release(tree), frames, settings["mini_frames"], settings["mini_side_px"])
@@ -108,7 +111,7 @@ def assemble(
         document = {
             "schema": "release",
             "repository": repository,
-            "version": settings["release"]["version"],
+            "version": version,
             "date": settings["release"]["date"],
             "spdx": spdx,
             "commercial": terms["commercial"],
@@ -140,8 +143,10 @@ def assemble(
         write_table(tree / "metadata" / "files.parquet", listed, "release_files")
         hashes |= _hash_rest(tree, hashes)
         _write_sums(tree, hashes)
-        difference = changes(before, read_records(tree))
-        check_version(difference)
+        found = read_records(tree)
+        for record in earlier:
+            check_version(changes(record, found))
+        difference = changes(before, found)
         write_json(tree / "changes.json", difference, "changes")
         hashes["changes.json"] = sha256_file(tree / "changes.json")
         write_json(
@@ -158,7 +163,7 @@ def assemble(
         settings=settings,
         inputs={"checksums": out / "SHA256SUMS"}
         | ({"split_report": split_report} if split_report else {})
-        | ({"previous": previous / "release.json"} if previous else {})
+        | {f"record_{record.name}": record / "release.json" for record in records}
         | {f"package_{item['id']}": Path(item["package"]) / "inventory.parquet" for item in ordered},
         counts={
             "sequences": len(rows),

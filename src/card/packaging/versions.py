@@ -144,14 +144,13 @@ def next_version(version: str, part: str) -> str:
     return f"{major}.{minor}.{patch + 1}" if part == "patch" else version
 
 
-def latest_record(folder: Path, repository: str, version: str) -> Path | None:
-    """Record of the newest release of a repository before `version` under `folder`; None without one."""
-    found = [
-        path.parent
-        for path in (folder / repository).glob("*/release.json")
-        if _numbers(path.parent.name) < _numbers(version)
+def latest_records(folder: Path, repository: str, version: str) -> list[Path]:
+    """Records under `folder` of the newest release before `version`, then of `version` itself, if there."""
+    found = [path.parent for path in (folder / repository).glob("*/release.json")]
+    before = [path for path in found if _numbers(path.name) < _numbers(version)]
+    return sorted(before, key=lambda path: _numbers(path.name))[-1:] + [
+        path for path in found if path.name == version
     ]
-    return max(found, key=lambda path: _numbers(path.name), default=None)
 
 
 def _numbers(version: str) -> tuple[int, int, int]:
