@@ -19,6 +19,7 @@ configfile: "config/config.yaml"
 
 include: "workflow/rules/common.smk"
 include: "workflow/rules/sequences.smk"
+include: "workflow/rules/repositories.smk"
 include: "workflow/rules/simulation.smk"
 include: "workflow/rules/ingest.smk"
 include: "workflow/rules/calibration.smk"

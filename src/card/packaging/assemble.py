@@ -1,6 +1,5 @@
 """Stage `release`: the packages of one licence as a complete tree."""
 
-import os
 import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -16,12 +15,12 @@ from card.artifacts import (
     write_report,
     write_table,
 )
-from card.errors import CardError
 from card.packaging.croissant import croissant
 from card.packaging.files_table import file_columns
 from card.packaging.metadata import write_metadata
 from card.packaging.mini import mini_columns
 from card.packaging.pages import write_pages
+from card.packaging.placing import check_license, place
 from card.packaging.reader import SPLITS, Release
 from card.packaging.retractions import retraction_rows
 from card.packaging.takedowns import whole_tombstones
@@ -83,8 +82,8 @@ def assemble(
     with atomic_folder(out) as tree:
         hashes: dict[str, str] = {}
         for item in progress(ordered, f"assemble {repository}"):
-            _check_license(item["id"], Path(item["package"]), spdx)
-            hashes |= _place(item["id"], Path(item["package"]), tree)
+            check_license(item["id"], Path(item["package"]), spdx)
+            hashes |= place(item["id"], Path(item["package"]), tree)
         rows = [read_json(Path(item["package"]) / "sequence.json", "release_sequence") for item in ordered]
         earlier = [read_records(record) for record in records]
         version = settings["release"]["version"]
@@ -181,45 +180,6 @@ def assemble(
             if _outside_ledger(frames, item["id"])
         ],
     )
-
-
-def _check_license(sequence: str, package: Path, spdx: str) -> None:
-    """The firewall: every statement of a licence in the package must name the tree's."""
-    stated = {
-        "sequence.json": {read_json(package / "sequence.json", "release_sequence")["spdx"]},
-        "provenance.json": {read_json(package / "sidecars" / "provenance.json", "provenance")["spdx"]},
-        "members.parquet": set(
-            read_table(package / "members.parquet", "release_members")["spdx"].to_pylist()
-        ),
-        "frames.parquet": set(read_table(package / "frames.parquet", "package_frames")["spdx"].to_pylist()),
-    }
-    for name, found in stated.items():
-        if found - {spdx}:
-            raise CardError(
-                "file under another licence than the tree",
-                where=f"sequence {sequence}, {name}",
-                found=", ".join(sorted(found - {spdx})),
-                wanted=spdx,
-            )
-
-
-def _place(sequence: str, package: Path, tree: Path) -> dict[str, str]:
-    """Link (or copy) a package's shards and sidecars into the tree; return their recorded hashes."""
-    listed = read_table(package / "inventory.parquet", "inventory").to_pydict()
-    hashes = {}
-    for name, sha256 in zip(listed["name"], listed["sha256"], strict=True):
-        folder, _, rest = name.partition("/")
-        if folder not in ("data", "sidecars"):
-            continue
-        path = f"{'data' if folder == 'data' else 'sequences'}/{sequence}/{rest}"
-        target = tree / path
-        target.parent.mkdir(parents=True, exist_ok=True)
-        try:
-            os.link(package / name, target)
-        except OSError:  # another file system, or one without hard links
-            shutil.copyfile(package / name, target)
-        hashes[path] = sha256
-    return hashes
 
 
 def _overrides(tree: Path, sequences: Sequence[str]) -> list[dict[str, str]]:
