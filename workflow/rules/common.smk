@@ -3,6 +3,7 @@ import os
 import sys
 from dataclasses import asdict
 from pathlib import Path
+from types import SimpleNamespace
 
 from card.annotations.loop.sample import read_sample
 from card.artifacts.code import code_hash

@@ -185,18 +185,22 @@ def report_inputs(wildcards):
     ]
 
 
-def method_of(wildcards):
-    """A param function: what the configuration says of a method, for one tree, as a dict of builtins."""
-    method = SETTINGS["benchmark"]["methods"][wildcards.method]
+def method_settings(name, repository):
+    """What the configuration says of a method, for one tree, as a dict of builtins."""
+    method = SETTINGS["benchmark"]["methods"][name]
     task = method.get("task", "depth")
     split = "zero_shot" if task == "odometry" else SETTINGS["benchmark"]["split"]
     return {
-        "predictions": str(Path(method["predictions"], wildcards.repository)),
+        "predictions": str(Path(method["predictions"], repository)),
         "task": task,
         "split": method.get("split", split),
         "space": method.get("space", "original"),
         "unit_m": method.get("unit_m"),
     }
+
+
+def method_of(wildcards):
+    return method_settings(wildcards.method, wildcards.repository)
 
 
 def predictions_fingerprint(wildcards):
@@ -210,27 +214,49 @@ def predictions_fingerprint(wildcards):
     )
 
 
-def methods_for(repository, odometry=False):
-    """The methods that have predictions for a tree: of depth maps, or of trajectories."""
+def methods_of(*tasks):
+    methods = SETTINGS["benchmark"]["methods"]
+    return [name for name in methods if methods[name].get("task", "depth") in tasks]
+
+
+def methods_for(repository, *tasks):
+    """The methods that have predictions for a tree."""
     return [
         name
-        for name, method in SETTINGS["benchmark"]["methods"].items()
+        for name in methods_of(*tasks)
         if in_tree(repository)
-        and (method.get("task") == "odometry") == odometry
-        and Path(method["predictions"], repository).is_dir()
+        and Path(method_settings(name, repository)["predictions"]).is_dir()
+    ]
+
+
+def compared_methods(wildcards):
+    """The methods of depth maps for a tree on the common split: others have a table of their own."""
+    found = {
+        name: method_settings(name, wildcards.repository)
+        for name in methods_for(wildcards.repository, "depth", "completion")
+    }
+    common = SETTINGS["benchmark"]["split"]
+    return {name: method for name, method in found.items() if method["split"] == common}
+
+
+def compared_evaluations(wildcards):
+    return [
+        f"results/benchmark/{method}/{wildcards.repository}/evaluation.json"
+        for method in compared_methods(wildcards)
     ]
 
 
 def evaluations(wildcards):
-    """One table a method and tree that the method has predictions for."""
-    tables = [
-        f"results/benchmark/{method}/{repository}/table.md"
-        for repository in REPOSITORIES
-        for method in (
-            *methods_for(repository),
-            *methods_for(repository, odometry=True),
-        )
-    ]
+    """Tables of all methods on each tree that they have predictions for, and those that compare them."""
+    tables = []
+    for repository in REPOSITORIES:
+        tables += [
+            f"results/benchmark/{method}/{repository}/table.md"
+            for method in methods_for(repository, "depth", "completion", "odometry")
+        ]
+        of_tree = SimpleNamespace(repository=repository)
+        if compared_methods(of_tree):
+            tables.append(f"results/benchmark/{repository}/table.md")
     if not tables:
         raise WorkflowError(
             "card: no predictions to evaluate: name them in config.yaml under benchmark.methods"
