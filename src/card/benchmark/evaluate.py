@@ -1,6 +1,7 @@
 """Stage `benchmark`: score a method's depth maps on one split of a release."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from card.benchmark.frame_scores import (
     INPUT_PIXELS,
     SCALINGS,
     Evaluated,
+    FrameScores,
     frame_scores,
 )
 from card.benchmark.frames import (
@@ -19,14 +21,15 @@ from card.benchmark.frames import (
     Loaded,
     Method,
     Selection,
+    SequenceView,
     SequenceViews,
+    each_frame,
     evaluated,
     key,
     load,
-    loaded,
     select,
 )
-from card.benchmark.pixel_metrics import median_scale
+from card.benchmark.pixel_metrics import SUMS, median_scale
 from card.benchmark.plausible import PROBES, check_camera, check_unit
 from card.benchmark.results import Results
 from card.benchmark.tables import markdown
@@ -68,22 +71,25 @@ def evaluate(
     scalings, variants = TASKS[task]
     results = Results(scalings, settings)
     counts = dict.fromkeys(("boxes", "empty_boxes", "pixels", "pixels_out_of_view", "frames_without_road"), 0)
-    frames = loaded(opened, selection, method, views)
-    for frame, view in progress(frames, "evaluate", len(selection.rows)):
+
+    def score(frame: Loaded, view: SequenceView) -> tuple[Loaded, int, dict[str, FrameScores]]:
         given, unseen = evaluated(frame, view, settings)
-        counts["pixels_out_of_view"] += unseen
-        counts["pixels"] += given.truth.size
-        counts["frames_without_road"] += frame.road_from_camera is None
         size = (view.view.camera.width, view.view.camera.height)
-        boxes = [box[1:] for box in frame.boxes]
-        classes = [CLASSES[int(box[0])] for box in frame.boxes]
+        found = {}
         for variant in variants:
             part = given if variant == "all" else given.part(_not_input(opened, frame, given, settings))
-            scores = frame_scores(part, boxes, size, scalings, settings)
-            results.add(frame.row, classes, scores, variant)
-            if variant == "all":
-                counts["boxes"] += len(boxes)
-                counts["empty_boxes"] += int(np.count_nonzero(np.isnan(scores.box_depth)))
+            found[variant] = frame_scores(part, [box[1:] for box in frame.boxes], size, scalings, settings)
+        return replace(frame, prediction=None), unseen, found
+
+    scored = each_frame(opened, selection, method, views, score)
+    for frame, unseen, found in progress(scored, "evaluate", len(selection.rows)):
+        for variant, scores in found.items():
+            results.add(frame.row, [CLASSES[int(box[0])] for box in frame.boxes], scores, variant)
+        counts["boxes"] += len(frame.boxes)
+        counts["empty_boxes"] += int(np.count_nonzero(np.isnan(found["all"].box_depth)))
+        counts["pixels"] += int(found["all"].full[0, SUMS.index("truth")])
+        counts["pixels_out_of_view"] += unseen
+        counts["frames_without_road"] += frame.road_from_camera is None
 
     document = {
         "schema": "evaluation",

@@ -1,10 +1,11 @@
 """The frames of a split that are evaluated, with all that the evaluation reads of the release."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,10 @@ from card.packaging.reader import SPLITS, Release
 from card.packaging.reader.rig import Rig
 
 Row = Mapping[str, Any]
+T = TypeVar("T")
+
+#: Frames at work at the same time. Decompression and the compiled forms let go of the interpreter's lock.
+WORKERS = 2
 
 #: Classes of the label boxes by their number in a label file.
 CLASSES = ("positive", "negative")
@@ -106,6 +111,7 @@ class SequenceViews:
         if camera not in self._views:
             # One camera's rays at a time: they are large.
             self._views = {camera: View(camera)}
+            _ = self._views[camera].rays  # before threads ask for them
         return SequenceView(rig, self._views[camera], image_space(self._space, rig))
 
 
@@ -134,17 +140,23 @@ def evaluated(frame: Loaded, view: SequenceView, settings: Mapping[str, Any]) ->
     return given.part(seen), int(np.count_nonzero(~seen))
 
 
-def loaded(
-    release: Release, selection: Selection, method: Method, views: SequenceViews
-) -> Iterator[tuple[Loaded, SequenceView]]:
-    """Read frame after frame, the next one while the last is scored; two are in memory."""
-    with ThreadPoolExecutor(max_workers=1) as reader:
-        waiting = None
+def each_frame(
+    release: Release,
+    selection: Selection,
+    method: Method,
+    views: SequenceViews,
+    work: Callable[[Loaded, SequenceView], T],
+) -> Iterator[T]:
+    """What ``work`` gives for each frame, in their order; a few are read and worked on at the same time."""
+
+    def one(row: Row, view: SequenceView) -> T:
+        return work(load(release, row, selection.files[key(row)], method, view), view)
+
+    waiting: deque[Future[T]] = deque()
+    with ThreadPoolExecutor(WORKERS) as pool:
         for row in selection.rows:
-            view = views.of(row["sequence"])
-            following = reader.submit(load, release, row, selection.files[key(row)], method, view)
-            if waiting is not None:
-                yield waiting[0].result(), waiting[1]
-            waiting = following, view
-        if waiting is not None:
-            yield waiting[0].result(), waiting[1]
+            waiting.append(pool.submit(one, row, views.of(row["sequence"])))
+            if len(waiting) > WORKERS:
+                yield waiting.popleft().result()
+        while waiting:
+            yield waiting.popleft().result()

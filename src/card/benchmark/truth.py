@@ -1,6 +1,7 @@
 """The evaluated pixels of a frame: where its ground truth falls in the original left image."""
 
-from dataclasses import dataclass
+import threading
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -21,6 +22,7 @@ class View:
     """A camera whose frames are evaluated one after the other; keeps what all of them share."""
 
     camera: CameraModel
+    _own: threading.local = field(default_factory=threading.local, repr=False, compare=False)
 
     @cached_property
     def rays(self) -> Array:
@@ -44,10 +46,13 @@ class View:
             block[:] = self.camera.rays(np.stack([u, v], axis=-1))[..., :2]
         return rays.reshape(-1, 2)
 
-    @cached_property
+    @property
     def scratch(self) -> NDArray[np.float32]:
-        """(H*W,) inf: the depth buffer that the compiled form borrows."""
-        return np.full(self.camera.width * self.camera.height, np.inf, dtype=np.float32)
+        """(H*W,) inf: the depth buffer that the compiled form borrows, one a thread."""
+        if not hasattr(self._own, "depth"):
+            self._own.depth = np.full(self.camera.width * self.camera.height, np.inf, dtype=np.float32)
+        depth: NDArray[np.float32] = self._own.depth
+        return depth
 
     def truth(
         self, points: NDArray[np.float32], limits: tuple[float, float], plain: bool = False
