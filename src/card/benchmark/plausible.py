@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from card.benchmark.image_space import SPACES, ImageSpace, image_space
 from card.errors import CardError
-from card.geometry import apply, rasterize
+from card.geometry import apply
 from card.packaging.reader.rig import Rig
 
 Array = NDArray[np.float64]
@@ -68,13 +68,12 @@ def check_camera(probes: Sequence[tuple[Any, Any, Rig]], declared: str, where: o
 
 
 def _seen_by(points: Any, rig: Rig, camera: str) -> tuple[Array, Array]:
-    """Depth (M,) of the ground truth in a camera's original image and the rays (M, 2) of its pixels."""
+    """Depth (M,) and rays (M, 2) with z = 1 of some points of the ground truth that a camera sees."""
     some = np.asarray(points[:: max(1, len(points) // PROBE_POINTS)], dtype=np.float64)
     moved = apply(rig.transform(f"{camera}_from_camera_left", {}), some)
     model = rig.camera(camera)
-    depth = rasterize(moved, model)
-    rows, columns = np.nonzero(np.isfinite(depth))
-    return depth[rows, columns], model.rays(np.stack([columns, rows], axis=1))[:, :2]
+    moved = moved[model.contains(model.project(moved))]
+    return moved[:, 2], moved[:, :2] / moved[:, 2:]
 
 
 def _spread(space: ImageSpace, prediction: Any, truth: Array, rays: Array) -> float:
