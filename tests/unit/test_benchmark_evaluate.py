@@ -21,6 +21,8 @@ from benchmark_release import (
 )
 
 from card.artifacts import check, read_json, read_table
+from card.benchmark import frame_scores
+from card.benchmark import truth as truth_module
 from card.benchmark.pixel_metrics import METRICS
 from card.cli import main
 from card.errors import CardError
@@ -153,6 +155,22 @@ def test_same_predictions_same_bytes(tree: Path, tmp_path: Path) -> None:
         outputs.append([path.read_bytes() for path in sorted((tmp_path / "p-out").iterdir())])
     assert len(outputs[0]) == 5
     assert outputs[0] == outputs[1]
+
+
+def test_without_the_compiler_the_plain_forms_give_the_same(
+    tree: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As in a light install, which has no numba."""
+    folder = predict(tmp_path / "p", lambda depth: np.sqrt(depth) * 4)
+    compiled = run(tree, folder)
+    for module in (truth_module, frame_scores):
+        monkeypatch.setattr(module, "compiled", lambda: None)
+    plain = run(tree, folder)
+    assert plain["counts"] == compiled["counts"]
+    for one, other in zip(plain["rows"], compiled["rows"], strict=True):
+        known = {name: value for name, value in other["metrics"].items() if value is not None}
+        assert {name for name, value in one["metrics"].items() if value is not None} == set(known)
+        assert {name: one["metrics"][name] for name in known} == pytest.approx(known, rel=1e-10)
 
 
 def test_the_command_evaluates(tree: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

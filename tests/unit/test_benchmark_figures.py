@@ -64,7 +64,10 @@ def test_maps_show_truth_and_the_scaled_prediction(work: Path) -> None:
     box = tuple(map(float, BOXES["drive", 0].split()[1:5]))
     span = crop_of(box, CAMERA.width, CAMERA.height)
     assert span == (slice(0, 140), slice(0, 140))
-    shown, predicted = truth_maps(frame, view, span, settings), predicted_maps(frame, view, span, settings)
+    shown, predicted = (
+        truth_maps(frame, view, span, settings),
+        predicted_maps(frame, view, span, settings, scaled=True),
+    )
     wanted = truth("drive", 0)[span]
     np.testing.assert_array_equal(np.isfinite(shown.depth), np.isfinite(wanted))
     np.testing.assert_allclose(shown.depth[np.isfinite(wanted)], wanted[np.isfinite(wanted)])

@@ -22,7 +22,6 @@ def draw_figures(
     """
     documents = [read_json(folder / "evaluation.json", "evaluation") for folder in evaluations]
     opened = Release(release)
-    settings = documents[0]["settings"]
     rows = {key(row): row for row in opened.frames(split)}
     boxes = [
         row
@@ -32,7 +31,7 @@ def draw_figures(
     with atomic_folder(out) as partial:
         draw_distance(partial / "distance.png", documents)
         for name, box in sorted(largest_boxes(boxes).items()):
-            _draw_box(partial, name, box, rows[key(box)], opened, split, methods, settings)
+            _draw_box(partial, name, box, rows[key(box)], opened, split, methods, documents)
 
 
 def _draw_box(
@@ -43,8 +42,10 @@ def _draw_box(
     release: Release,
     split: str,
     methods: Sequence[Method],
-    settings: Mapping[str, Any],
+    documents: Sequence[Mapping[str, Any]],
 ) -> None:
+    settings = documents[0]["settings"]
+    scaled = {document["method"]: document["task"] == "depth" for document in documents}
     frames: dict[str, tuple[Loaded, SequenceView]] = {}
     for method in methods:
         path = select(release, split, method, settings["coverage_flags"]).files[key(row)]
@@ -59,11 +60,13 @@ def _draw_box(
     for span, draw in ((crop_of(label, *size), "sheet"), (whole, "heights")):
         truth = truth_maps(frame, view, span, settings)
         maps: dict[str, Maps] = {
-            method: predicted_maps(loaded, its_view, span, settings)
+            method: predicted_maps(loaded, its_view, span, settings, scaled[method])
             for method, (loaded, its_view) in frames.items()
         }
         path = folder / f"{draw}-{name}.png"
         if draw == "sheet":
-            draw_sheet(path, f"{title}, scaled to the truth's median", image, label, span, truth, maps)
+            draw_sheet(
+                path, f"{title}; depth methods scaled to the truth's median", image, label, span, truth, maps
+            )
         else:
             draw_heights(path, title, image, truth, maps, settings["height_thresholds_m"][1])

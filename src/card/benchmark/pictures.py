@@ -47,10 +47,12 @@ def truth_maps(frame: Loaded, view: SequenceView, span: Span, settings: Mapping[
     return Maps(cut, _height(cut, frame, view, span))
 
 
-def predicted_maps(frame: Loaded, view: SequenceView, span: Span, settings: Mapping[str, Any]) -> Maps:
-    """Depth and height of a prediction, scaled to the truth's median in the whole image."""
+def predicted_maps(
+    frame: Loaded, view: SequenceView, span: Span, settings: Mapping[str, Any], scaled: bool
+) -> Maps:
+    """Depth and height of a prediction; scaled : to the truth's median in the whole image."""
     given, _ = evaluated(frame, view, settings)
-    scale = median_scale(given.truth, given.prediction)
+    scale = median_scale(given.truth, given.prediction) if scaled else 1.0
     if view.space.name == "original":
         depth = np.array(frame.prediction[span], dtype=np.float64)
     else:
