@@ -9,7 +9,7 @@ from benchmark_release import CAMERA, EVALUATED, SWEEP, build_tree, cloud, predi
 from card.benchmark.completion import input_pixels, sparse_depth
 from card.errors import CardError
 from card.geometry import rasterize
-from card.packaging.reader import Release
+from card.packaging.reader import Frame, Release
 
 
 @pytest.fixture(scope="module")
@@ -17,14 +17,14 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return build_tree(tmp_path_factory.mktemp("release"))
 
 
-def frame_row(release: Release, sequence: str, frame: int) -> dict:
-    return next(r for r in release.frames("test") if (r["sequence"], r["frame"]) == (sequence, frame))
+def of(release: Release, sequence: str, number: int) -> Frame:
+    return next(frame for frame in release.iterate("test", sequence) if frame.number == number)
 
 
 @pytest.mark.parametrize(("sequence", "frame"), EVALUATED)
 def test_the_input_is_the_corrected_sweep_as_it_was_when_the_image_was_taken(tree, sequence, frame) -> None:
     release = Release(tree)
-    sparse = sparse_depth(release, frame_row(release, sequence, frame))
+    sparse = sparse_depth(of(release, sequence, frame))
     wanted = rasterize(cloud(sequence, frame)[:SWEEP], CAMERA)
     # A point on a pixel's edge may land beside it: the sweep is stored at 0.1 mm.
     same = np.isfinite(sparse) & np.isfinite(wanted)
@@ -36,7 +36,7 @@ def test_the_input_is_the_corrected_sweep_as_it_was_when_the_image_was_taken(tre
 def test_a_frame_without_a_sweep_is_told(tree: Path) -> None:
     release = Release(tree)
     with pytest.raises(CardError, match="drive, frame 6: frame has no front sweep"):
-        sparse_depth(release, frame_row(release, "drive", 6))
+        sparse_depth(of(release, "drive", 6))
 
 
 def test_truth_that_is_the_input_itself_is_known_by_place_and_depth() -> None:
@@ -55,7 +55,7 @@ def test_a_method_that_returns_its_input_shines_only_with_the_input_in_the_truth
     folder = predict(tmp_path / "copy", lambda depth: depth)
     rng = np.random.default_rng(0)
     for sequence, frame in EVALUATED:
-        sparse = sparse_depth(release, frame_row(release, sequence, frame))
+        sparse = sparse_depth(of(release, sequence, frame))
         depth = np.where(np.isfinite(sparse), sparse, rng.uniform(3, 40, sparse.shape))
         np.save(folder / sequence / f"{frame:06d}.npy", depth)
     document = run(tree, folder, task="completion")

@@ -1,8 +1,6 @@
 """Depth completion: the sweep that a method starts from, and the truth that is that very sweep."""
 
-from collections.abc import Mapping
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,32 +8,31 @@ from numpy.typing import NDArray
 from card.errors import CardError
 from card.geometry import Trajectory, apply, inverse, rasterize
 from card.geometry.corrections import correct_points
-from card.packaging.reader import Release
+from card.packaging.reader import Frame, Release
 
 Array = NDArray[np.float64]
 
 
-def sparse_depth(release: Release, row: Mapping[str, Any]) -> Array:
+def sparse_depth(frame: Frame) -> Array:
     """Depth (H, W) in metres of the frame's own front sweep in the original left image; NaN where none falls.
 
     The sweep is the first that ends after the image (the keyframe of the ground truth), with the range and
     channel corrections of the calibration, each point carried to the time of the image by the poses of the
     release. It is what a car has at that moment: unlike in the ground truth, nothing hidden is removed.
 
-    Parameters
-    ----------
-    row : of `Release.frames`.
+    >>> for frame in Release("card-germany").iterate("test"):         # doctest: +SKIP
+    ...     completed = method(frame.image(), sparse_depth(frame))
 
     Raises
     ------
     CardError
         If the release has no front sweep for the frame, or its poses do not cover the sweep.
     """
-    sequence, number = row["sequence"], row["lidar_front_burst"]
-    if number is None or not row["has_lidar_front"]:
-        raise CardError("frame has no front sweep", where=f"{sequence}, frame {row['frame']}")
+    release, sequence, number = frame.release, frame.sequence, frame.row["lidar_front_burst"]
+    sweep = frame.burst()
+    if number is None or sweep is None:
+        raise CardError("frame has no front sweep", where=f"{sequence}, frame {frame.number}")
     rig = release.rig(sequence)
-    sweep = release.burst(sequence, number)
     raw = np.column_stack([sweep.x, sweep.y, sweep.z])
     # A beam without return lies at the sensor's origin.
     returned = np.hypot(np.hypot(raw[:, 0], raw[:, 1]), raw[:, 2]) > 0
@@ -49,7 +46,7 @@ def sparse_depth(release: Release, row: Mapping[str, Any]) -> Array:
     stamps, at = np.unique(times[returned], return_inverse=True)
     in_rig = apply(rig.transform("rig_from_lidar_front", {}), points)
     world = apply(trajectory.at(stamps)[at], in_rig)
-    camera_from_world = inverse(trajectory.at(row["t_ns"]) @ rig.transform("rig_from_camera_left", {}))
+    camera_from_world = inverse(trajectory.at(frame.row["t_ns"]) @ rig.transform("rig_from_camera_left", {}))
     return rasterize(apply(camera_from_world, world), rig.camera("camera_left"))
 
 

@@ -33,7 +33,7 @@ from card.benchmark.pixel_metrics import SUMS, median_scale
 from card.benchmark.plausible import PROBES, check_camera, check_unit
 from card.benchmark.results import Results
 from card.benchmark.tables import markdown
-from card.packaging.reader import Release
+from card.packaging.reader import Frame, Release
 
 #: Completion is metric: its input gives the scale.
 TASKS = {"depth": (SCALINGS, INPUT_PIXELS[:1]), "completion": (SCALINGS[:1], INPUT_PIXELS)}
@@ -128,7 +128,7 @@ def evaluate(
 
 
 def _not_input(release: Release, frame: Loaded, given: Evaluated, settings: Mapping[str, Any]) -> Any:
-    sparse = sparse_depth(release, frame.row)
+    sparse = sparse_depth(Frame(release, frame.row))
     return ~input_pixels(given.pixels, given.truth, sparse, settings["input_tolerance_m"])
 
 

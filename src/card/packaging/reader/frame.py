@@ -26,6 +26,11 @@ class Frame:
         self.sequence: str = row["sequence"]
         self.number: int = row["frame"]
 
+    @property
+    def release(self) -> Release:
+        """The release that the frame is of."""
+        return self._release
+
     def image(self, camera: str = "camera_left") -> Any:
         """Image (H, W, 3) uint8 RGB as taken; with ``_undistorted`` behind the camera's name, undistorted."""
         taken = camera.removesuffix("_undistorted")
