@@ -18,7 +18,12 @@ from card.packaging.shards import Source, write_shards
 from card.simulation.calibrations import true_calibration
 
 CALIBRATION = true_calibration("2026-04-14-start", 0, "tiny")
-CALIBRATION["lidar_corrections"]["lidar_front"] |= {"range_offset_m": 0.03}
+CALIBRATION["lidar_corrections"]["lidar_front"] = {
+    "range_offset_m": 0.03,
+    "channel_range_offset_m": [0.0] * 32,
+    "channel_elevation_offset_rad": [0.0] * 32,
+    "channel_azimuth_offset_rad": [0.0] * 32,
+}
 CAMERAS = {
     name: CameraModel.from_json(CALIBRATION["cameras"][name]) for name in ("camera_left", "camera_right")
 }
