@@ -15,6 +15,7 @@ from card.ground_truth.rays import POSES, pose_times, ray_origins
 from card.ground_truth.reference.crossed import crossed_voxels
 from card.ground_truth.reference.surface import local_planes
 from card.ground_truth.reference.visibility_votes import visibility_votes as plain_votes
+from card.ground_truth.sweep_registration import MapTarget
 from card.ground_truth.sweeps import Sweep
 from card.ground_truth.visibility_votes import (
     Votes,
@@ -178,6 +179,31 @@ def test_rays_along_a_face_are_walked_to_their_end(tilt):
     assert_same_votes(drive)
 
 
+def test_a_sweep_with_a_wrong_pose_is_registered_before_it_votes():
+    rng = np.random.default_rng(4)
+    floor = rng.uniform(-8, 8, (40_000, 3)) * (1, 1, 0)
+    walls = [rng.uniform(-8, 8, (12_000, 3)) * mask + (0, 0, 1.5) for mask in ((0, 1, 0.2), (1, 0, 0.2))]
+    scene = np.concatenate([floor, walls[0] + (8, 0, 0), walls[1] + (0, 8, 0)])
+    clouds = [scene[k::4] + rng.normal(0, 0.004, scene[k::4].shape) for k in range(4)]
+    origins = np.array([[0.0, 0, 1.6], [0.6, 0, 1.6], [0, 0.6, 1.6], [0.6, 0.6, 1.6]])
+    error = np.array([0.05, -0.04, 0.06])
+    drive = StandingDrive(
+        [*clouds[:3], clouds[3] + error], np.array([*origins[:3], origins[3] + error]), np.ones(4, bool)
+    )
+    voxels = drive.map()
+    target = MapTarget(GRID.corners(voxels.keys) + voxels.centroids, origins[0], SETTINGS)
+    points, moved = target.register(drive.clouds[3], np.tile(drive.origins[3], (len(drive.clouds[3]), 1)))
+    # The map holds the wrong sweep too, a quarter of its points.
+    assert np.abs(points - clouds[3]).max() < 0.03
+    assert moved - origins[3] == pytest.approx(np.zeros_like(moved), abs=0.03)
+    chosen = np.arange(len(voxels.keys))
+    hits = [
+        visibility_votes(drive, [3], voxels, chosen, SETTINGS | {"register_sweeps": registered}).hits
+        for registered in (False, True)
+    ]
+    assert not np.array_equal(*hits)
+
+
 def test_no_voxels_and_no_points_get_no_votes():
     drive = random_drive(0)
     assert len(assert_same_votes(drive, np.empty(0, dtype=np.int64)).hits) == 0
@@ -308,6 +334,21 @@ def test_flow_votes_count_a_voxel_once_a_pair():
     assert (votes.comparisons == 3).all()
     assert not votes.moved.any()
     assert (find(voxels.keys, GRID.keys(cloud)) >= 0).all()
+
+
+def test_a_submap_of_sparse_sweeps_contradicts_less_of_a_static_floor():
+    rng = np.random.default_rng(2)
+    floor = rng.uniform(-3, 3, (12_000, 3)) * (1, 1, 0.002)
+    wall = rng.uniform(-3, 3, (12_000, 3)) * (0.002, 1, 0.5) + (3, 0, 1.5)
+    clouds = [np.concatenate([floor[k::12], wall[k::12]]) for k in range(12)]
+    origins = np.arange(12)[:, None] * np.array([[0.2, 0, 0]]) + (0, 0, 1)
+    drive = StandingDrive(clouds, origins, np.ones(12, bool))
+    voxels = drive.map()
+    moved = {
+        method: flow_votes(drive, voxels, SETTINGS | {"flow_method": method}).moved.sum()
+        for method in ("literal", "submap")
+    }
+    assert 0 < moved["submap"] < 0.2 * moved["literal"]
 
 
 def test_dynamic_by_flow_wants_votes_and_share():

@@ -34,6 +34,16 @@ def test_quotas_round_halves_up():
     assert required_votes(0.2 + 0.7 / 2, 1, 4, 0.2, 0.9) == 3
 
 
+def test_halves_go_up_or_to_the_even_number():
+    halves = [0.55, 0.2 + 0.7 / 6, 0.2 + 0.7 / 2, 0.2 + 0.7 * 5 / 6]
+    for rounding, wanted in (("half_up", [2, 4, 3, 2]), ("half_even", [2, 4, 2, 2])):
+        found = [
+            required_votes(b, 1, v, 0.2, 0.9, rounding) for b, v in zip(halves, (2, 4, 4, 4), strict=True)
+        ]
+        assert found == wanted
+    assert required_votes(0.4, 1, 4, 0.2, 0.9, "half_even") == required_votes(0.4, 1, 4, 0.2, 0.9)
+
+
 def greedy(views: list[int], origins: np.ndarray, spacing: float) -> list[int]:
     accepted: list[int] = []
     for view in views:
@@ -149,7 +159,9 @@ def test_the_compiled_map_is_the_plain_one_however_that_groups_its_bursts(chunk_
     st.lists(st.tuples(*[st.integers(-3, 3)] * 3), min_size=25, max_size=25),
     st.sampled_from([(0.0, 0.0, 0.0), (-1e-7, 0.05, -0.05), (4e5, -5.3e6, 600.0)]),
     st.sampled_from([0.01, 0.03, 0.2]),
-    st.sampled_from([{}, {"front_votes_max": 1, "rear_votes_max": 4}, {"baseline_far_m": 0.1}]),
+    st.sampled_from(
+        [{}, {"front_votes_max": 1, "rear_votes_max": 4}, {"baseline_far_m": 0.1}, {"rear_view_spacing_m": 0}]
+    ),
 )
 def test_the_compiled_map_is_the_plain_one_on_any_bursts(clouds, places, centre, pitch, changed):
     """Points on a coarse lattice: on faces of voxels, on both sides of zero, far away, many alike."""
@@ -178,6 +190,14 @@ def test_sums_of_offsets_go_beyond_32_bits():
     built = build_voxel_map(bursts, np.zeros((5, 3)), grid_round(np.zeros(3)), SETTINGS)
     assert built.counts.tolist() == [1_500_000]
     assert built.centroids[0] == pytest.approx(np.full(3, 0.0999), abs=0.1 / OFFSET_STEPS)
+
+
+def test_without_a_spacing_every_rear_burst_is_a_view():
+    bursts = [(i, i == 0, np.zeros((3, 3))) for i in range(4)]
+    filled = SETTINGS | {"rear_view_spacing_m": 0, "rear_votes_max": 3}
+    for build in (build_voxel_map, plain_voxel_map):
+        assert build(bursts, np.zeros((4, 3)), grid_round(np.zeros(3)), filled).rear_views.tolist() == [3]
+        assert build(bursts, np.zeros((4, 3)), grid_round(np.zeros(3)), SETTINGS).rear_views.tolist() == [1]
 
 
 def test_no_points_make_an_empty_map():

@@ -1,4 +1,4 @@
-"""Dynamic pruning with ICP flow as the paper's supplement C has it, word for word."""
+"""Dynamic pruning with ICP flow: the paper's supplement C word for word, or against several sweeps."""
 
 from __future__ import annotations
 
@@ -39,13 +39,22 @@ def scan_pairs(drive: Drive, baseline: float, gap_s: float) -> list[tuple[int, i
 
 
 def flow_votes(drive: Drive, voxels: VoxelMap, settings: Mapping[str, Any]) -> FlowVotes:
-    """Votes of all voxels of the map from all pairs of sweeps."""
+    """Votes of all voxels of the map from all pairs of sweeps.
+
+    With `flow_method` "submap" the residual of a pair (i, j) is the distance to the `flow_submap_sweeps`
+    sweeps of the LiDAR round j, which one registration of j moves together.
+    """
+    around = settings["flow_submap_sweeps"] // 2 if settings["flow_method"] == "submap" else 0
     votes = FlowVotes(*(np.zeros(len(voxels.keys), dtype=np.int32) for _ in range(2)))
     for i, j in scan_pairs(drive, settings["flow_baseline_m"], settings["flow_min_gap_s"]):
         reference, other = drive.sweep(i).points, drive.sweep(j).points
         if not len(reference) or not len(other):
             continue
-        residuals = flow_residuals(reference, other, drive.origins[i], settings)
+        of_sensor = drive.of(bool(drive.front[j]))
+        at = int(np.searchsorted(of_sensor, j))
+        near = [int(k) for k in of_sensor[max(at - around, 0) : at + around + 1] if k not in (i, j)]
+        more = np.concatenate([np.empty((0, 3)), *(drive.sweep(k).points for k in near)])
+        residuals = flow_residuals(reference, other, drive.origins[i], settings, more)
         voxel = find(voxels.keys, voxels.grid.keys(reference))
         votes.comparisons[np.unique(voxel)] += 1
         votes.moved[np.unique(voxel[residuals > settings["flow_residual_m"]])] += 1
@@ -57,6 +66,7 @@ def flow_residuals(
     other: npt.NDArray[np.float64],
     origin: npt.NDArray[np.float64],
     settings: Mapping[str, Any],
+    more: npt.NDArray[np.float64] | None = None,
 ) -> npt.NDArray[np.float64]:
     """delta (N,), metres: distance of each reference point to the other sweep, registered by VGICP.
 
@@ -64,6 +74,7 @@ def flow_residuals(
     ----------
     reference, other : (N, 3) and (M, 3) world, metres.
     origin : (3,) a point near both: small_gicp drops points too far from zero.
+    more : (K, 3) points that move with the other sweep and count like its own.
     """
     import small_gicp
     from scipy.spatial import cKDTree
@@ -81,7 +92,8 @@ def flow_residuals(
     )
     # A registration that wanders off would contradict everything: the poses are then the better guess.
     target_from_source = result.T_target_source if result.converged else np.eye(4)
-    aligned = apply(target_from_source, source)
+    moved = source if more is None else np.concatenate([source, more - origin])
+    aligned = apply(target_from_source, moved)
     distances, _ = cKDTree(aligned).query(target)
     return np.asarray(distances, dtype=np.float64)
 

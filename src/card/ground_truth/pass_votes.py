@@ -109,6 +109,8 @@ def _enter_returns(
         length, _, _, _ = _direction(points[i], origins[i])
         if length <= rule.furthest_m:
             v = region.grid.number[b, x & 7, (y & 7) << 3 | z & 7]
+            if v < 0:
+                continue
             if region.known[v] != 3 * sweep + _DONE:
                 region.known[v] = 3 * sweep + _DONE
                 if region.chosen[v] >= 0:

@@ -10,15 +10,20 @@ import numpy.typing as npt
 
 
 def required_votes(
-    baseline: npt.ArrayLike, v_min: int, v_max: int, near: float, far: float
+    baseline: npt.ArrayLike, v_min: int, v_max: int, near: float, far: float, rounding: str = "half_up"
 ) -> npt.NDArray[np.int64]:
     """req(b; v_min, v_max) for baselines (...) in metres: v_max up to `near`, falling to v_min at `far`.
 
-    Rounded half up; a number within 1e-9 of a half counts as the half it stands for.
+    A number within 1e-9 of a half counts as the half it stands for; `rounding` says where halves go.
     """
     clipped = np.clip(baseline, near, far)
     votes = v_max - (clipped - near) / (far - near) * (v_max - v_min)
-    return np.floor(votes + 0.5 + 1e-9).astype(np.int64)
+    up = np.floor(votes + 0.5 + 1e-9).astype(np.int64)
+    if rounding == "half_up":
+        return up
+    half = np.abs(votes + 0.5 - up) <= 1e-9
+    even: npt.NDArray[np.int64] = up - (half & (up % 2 == 1))
+    return even
 
 
 def meets_quotas(
@@ -29,6 +34,11 @@ def meets_quotas(
 ) -> npt.NDArray[np.bool_]:
     """Whether voxels (V,) have the front and the rear votes that their baseline (V,) asks for."""
     near, far = settings["baseline_near_m"], settings["baseline_far_m"]
-    front = required_votes(baseline, settings["front_votes_min"], settings["front_votes_max"], near, far)
-    rear = required_votes(baseline, settings["rear_votes_min"], settings["rear_votes_max"], near, far)
+    rounding = settings["votes_rounding"]
+    front, rear = (
+        required_votes(
+            baseline, settings[f"{name}_votes_min"], settings[f"{name}_votes_max"], near, far, rounding
+        )
+        for name in ("front", "rear")
+    )
     return (front_views >= front) & (rear_views >= rear)

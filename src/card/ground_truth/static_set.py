@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from card.ground_truth.icp_flow import dynamic_by_flow, flow_votes
 from card.ground_truth.quotas import meets_quotas
 from card.ground_truth.sweeps import Drive
 from card.ground_truth.visibility_votes import dynamic_by_visibility, evidence_sweeps, visibility_votes
-from card.ground_truth.voxel_map import build_voxel_map
+from card.ground_truth.voxel_map import VoxelMap, build_voxel_map
 from card.ground_truth.voxels import VoxelGrid
 
 
@@ -29,14 +29,20 @@ class StaticSet:
 
 
 def static_voxels(drive: Drive, settings: Mapping[str, Any]) -> StaticSet:
-    """The global static voxel set, computed once a drive.
-
-    With `flow_method` "literal" or "off" the quotas decide, as in the paper, and "literal" prunes by ICP
-    flow. With "visibility" a voxel that both LiDARs hit is kept unless its votes contradict it.
-    """
+    """The global static voxel set, computed once a drive."""
     grid = VoxelGrid.around(drive.trajectory, settings["voxel_size_m"])
     why = {"points_at_sensor_origin": 0, "points_cropped": 0, "points": 0}
     voxels = build_voxel_map(_stream(drive, why), drive.origins, grid, settings)
+    static = prune(drive, voxels, settings)
+    return replace(static, why=why | static.why)
+
+
+def prune(drive: Drive, voxels: VoxelMap, settings: Mapping[str, Any]) -> StaticSet:
+    """The voxels of a drive's map that stand still.
+
+    With `flow_method` "literal", "submap" or "off" the quotas decide, as in the paper, and the first two
+    prune by ICP flow. With "visibility" a voxel that both LiDARs hit is kept unless its votes contradict it.
+    """
     quotas = meets_quotas(voxels.front_views, voxels.rear_views, voxels.baseline, settings)
     rigid = voxels.extents <= settings["rigidity_m"]
     method = settings["flow_method"]
@@ -47,10 +53,10 @@ def static_voxels(drive: Drive, settings: Mapping[str, Any]) -> StaticSet:
         sweeps = evidence_sweeps(drive, settings["flow_baseline_m"], settings["evidence_step"])
         votes = visibility_votes(drive, progress(sweeps, "moved votes"), voxels, chosen, settings)
         dynamic = dynamic_by_visibility(votes, quotas[chosen], settings)
-    elif method == "literal":
+    elif method != "off":
         dynamic = dynamic_by_flow(flow_votes(drive, voxels, settings), settings)[chosen]
     static = chosen[~dynamic]
-    why |= {
+    why = {
         "voxels": len(voxels.keys),
         "voxels_hit_by_both": int(voxels.hit_by_both.sum()),
         "voxels_quotas_met": int(quotas.sum()),
@@ -58,7 +64,7 @@ def static_voxels(drive: Drive, settings: Mapping[str, Any]) -> StaticSet:
         "voxels_dynamic": int(dynamic.sum()),
         "voxels_static": len(static),
     }
-    return StaticSet(grid, voxels.keys[static], voxels.counts[static], why)
+    return StaticSet(voxels.grid, voxels.keys[static], voxels.counts[static], why)
 
 
 def _stream(drive: Drive, why: dict[str, int]) -> Iterator[tuple[int, bool, npt.NDArray[np.float64]]]:

@@ -17,6 +17,7 @@ from card.ground_truth.block_grid import block_grid
 from card.ground_truth.pass_votes import PassRule, Region, sweep_votes
 from card.ground_truth.planes import PlaneRule, find_planes
 from card.ground_truth.rays import ray_origins
+from card.ground_truth.sweep_registration import MapTarget
 from card.ground_truth.sweeps import Drive
 from card.ground_truth.voxel_map import VoxelMap
 from card.ground_truth.voxels import pack, unpack
@@ -69,12 +70,13 @@ def visibility_votes(
       round the voxel;
     - *moved* if no return is near, a ray passes `moved_gap_m` or more before q and, where the voxel is planar
       (`planes.find_planes`), |n (q - c)| > `flow_residual_m` and |n d| > `planar_min_incidence`;
-    and otherwise nothing. `reference.visibility_votes` is the same in plain numpy.
+    and otherwise nothing. With `register_sweeps` a sweep is first registered to the map, which only its own
+    votes see. `reference.visibility_votes` is the same in plain numpy.
     """
     rules = _rules(settings)
     votes = np.zeros((len(chosen), 3), dtype=np.int32)
     tiles = _Tiles(voxels)
-    region, centre = None, np.full(3, np.inf)
+    region, target, centre = None, None, np.full(3, np.inf)
     for i in sweeps:
         sweep = drive.sweep(i)
         if not len(sweep.points):
@@ -82,8 +84,15 @@ def visibility_votes(
         origins = ray_origins(drive, i, sweep)
         if region is None or np.linalg.norm(origins - centre, axis=1).max() > _REACH_M:
             centre = drive.origins[i]
-            region = _region(voxels, chosen, tiles, centre, rules)
-        sweep_votes(i, sweep.points, origins, voxels.grid.size, region, rules[0], votes)
+            near = tiles.within(voxels.grid.indices(centre[None])[0], _radius(voxels, rules))
+            region = _region(voxels, chosen, near, centre, rules)
+            if settings["register_sweeps"]:
+                centroids = voxels.grid.corners(voxels.keys[near]) + voxels.centroids[near]
+                target = MapTarget(centroids, centre, settings)
+        points = sweep.points
+        if target is not None:
+            points, origins = target.register(points, origins)
+        sweep_votes(i, points, origins, voxels.grid.size, region, rules[0], votes)
     return Votes(*votes.T)
 
 
@@ -121,20 +130,23 @@ def _rules(settings: Mapping[str, Any]) -> tuple[PassRule, PlaneRule]:
     return passes, planes
 
 
+def _radius(voxels: VoxelMap, rules: tuple[PassRule, PlaneRule]) -> float:
+    """How far, in voxels, what sweeps within `_REACH_M` of a place speak of may lie, with its neighbours."""
+    reach = _REACH_M + rules[0].furthest_m
+    return reach / voxels.grid.size + 8 + 2 * rules[1].near_voxels
+
+
 def _region(
     voxels: VoxelMap,
     chosen: Index,
-    tiles: _Tiles,
+    near: Index,
     centre: npt.NDArray[np.float64],
     rules: tuple[PassRule, PlaneRule],
 ) -> Region:
-    """All voxels that sweeps within `_REACH_M` of `centre` can say something about, and their neighbours."""
-    passes, planes = rules
-    size = voxels.grid.size
+    """The voxels at positions `near` in the map, for sweeps within `_REACH_M` of `centre`."""
+    size, planes = voxels.grid.size, rules[1]
     index = voxels.grid.indices(centre[None])
     reach = int(np.ceil(_REACH_M / size)) + 8
-    radius = reach + passes.furthest_m / size
-    near = tiles.within(index[0], radius + 2 * planes.near_voxels)
     grid = block_grid(voxels.keys[near], np.concatenate([index - reach, index + reach]))
     at = np.minimum(np.searchsorted(chosen, near), max(len(chosen) - 1, 0))
     wanted = chosen[at] == near if len(chosen) else np.zeros(len(near), dtype=np.bool_)

@@ -76,6 +76,7 @@ class _State:
         self._first = np.array(grid.first, dtype=np.int64)
         self._gate = (
             float(settings["min_view_spacing_m"]),
+            float(settings["rear_view_spacing_m"]),
             int(settings["front_votes_max"]),
             int(settings["rear_votes_max"]),
             float(settings["baseline_far_m"]),

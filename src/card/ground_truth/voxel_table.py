@@ -46,7 +46,8 @@ def add_burst(
     origins: Floats,
     size: float,
     first: Index,
-    spacing: float,
+    front_spacing: float,
+    rear_spacing: float,
     enough_front: int,
     enough_rear: int,
     far: float,
@@ -92,9 +93,9 @@ def add_burst(
         v.high_x, v.high_y, v.high_z = max(v.high_x, qx), max(v.high_y, qy), max(v.high_z, qz)
         if front:
             if v.front_views < enough_front or v.baseline < far:
-                _see(v, burst, True, origins, spacing, views, used)
+                _see(v, burst, True, origins, front_spacing, views, used)
         elif v.rear_views < enough_rear:
-            _see(v, burst, False, origins, spacing, views, used)
+            _see(v, burst, False, origins, rear_spacing, views, used)
     return -1
 
 
@@ -109,7 +110,7 @@ def _see(v: Any, burst: int, front: bool, origins: Floats, spacing: float, views
             v.rear, v.rear_views = burst, 1
         return
     widest = _apart(origins, burst, earliest)
-    if widest < spacing:
+    if earliest == burst or widest < spacing:
         return
     at = v.more
     while at >= 0:
@@ -117,7 +118,7 @@ def _see(v: Any, burst: int, front: bool, origins: Floats, spacing: float, views
         other = views[at, 0] if front else -1 - views[at, 0]
         if other >= 0:
             apart = _apart(origins, burst, other)
-            if apart < spacing:
+            if other == burst or apart < spacing:
                 return
             widest = max(widest, apart)
         at = views[at, 1]

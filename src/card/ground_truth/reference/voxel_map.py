@@ -49,7 +49,7 @@ class _State:
         self, origins: npt.NDArray[np.float64], grid: VoxelGrid, settings: Mapping[str, Any]
     ) -> None:
         self.origins, self.grid = origins, grid
-        self.spacing = settings["min_view_spacing_m"]
+        self.spacing = {True: settings["min_view_spacing_m"], False: settings["rear_view_spacing_m"]}
         # (views, baseline) after which a sensor's quota can no longer fail; the rear has no baseline.
         self.enough = {
             True: (settings["front_votes_max"], settings["baseline_far_m"]),
@@ -119,7 +119,9 @@ class _State:
         voxels, local = np.unique(slot[order], return_inverse=True)
         # Run again over what was accepted before, then what is new: the greedy outcome is the same.
         enough, far = self.enough[front]
-        views = distinct_views(local, burst[order], self.origins, len(voxels), self.spacing, enough, far)
+        views = distinct_views(
+            local, burst[order], self.origins, len(voxels), self.spacing[front], enough, far
+        )
         c[f"views_{name}"][voxels] = views.count
         c[f"settled_{name}"][voxels] = views.settled
         if front:
