@@ -13,6 +13,8 @@ from card.artifacts import default_settings, read_json, read_table, write_json, 
 from card.errors import CardError
 from card.geometry import Trajectory, from_json, transform
 from card.poses import import_trajectory
+from card.recording.burst import Burst
+from card.recording.laz import write_burst
 from card.simulation.calibrations import true_calibration
 
 START_NS = 1_776_153_600_000_000_000
@@ -77,6 +79,11 @@ def drive(tmp_path: Path) -> Path:
         "file": [f"lidar_front/{t_ns}.laz" for t_ns in starts],
     }
     write_table(tmp_path / "bursts.parquet", bursts, "bursts")
+    (tmp_path / "lidar_front").mkdir()
+    points, ring = np.full((10, 3), 5.0), np.zeros(10, np.uint8)
+    for t_ns in starts:
+        burst = Burst(int(t_ns), points, ring, ring, np.arange(10, dtype=np.uint32) * 11_000_000)
+        write_burst(tmp_path / "lidar_front" / f"{t_ns}.laz", burst)
     write_frames(tmp_path, START_NS + np.arange(20, 30) * 100_000_000 + 7)
     return tmp_path
 
@@ -105,7 +112,7 @@ def run(folder: Path, **changes: Any) -> tuple[Trajectory, list[dict[str, Any]],
         trajectory=folder / "trajectory.parquet",
         poses=folder / "poses.json",
         report=folder / "poses.report.json",
-        settings=default_settings("poses") | changes,
+        settings=default_settings("poses") | {"mode": "import", "quality_spacing_m": 20.0} | changes,
         gates=[],
     )
     return (

@@ -11,7 +11,18 @@ from project import Project
 TOWN = "de_town_bumps"
 GERMANY, ITALY = "card-germany", "card-italy"
 DRIVES = [TOWN, "de_rural_potholes", "de_gravel_offroad", "it_town_revisit", "it_zero_shot"]
-STAGES = ["ingest", "poses", "ground_truth", "wheels", "privacy", "annotations", "splits", "package"]
+STAGES = [
+    "ingest",
+    "odometry",
+    "pose_graph",
+    "poses",
+    "ground_truth",
+    "wheels",
+    "privacy",
+    "annotations",
+    "splits",
+    "package",
+]
 
 
 def chain(id: str, *stages: str) -> set[tuple[str, str]]:

@@ -46,8 +46,18 @@ def has_camera(sequence):
     return any(name in sequence.modalities for name in CAMERAS)
 
 
+def poses_mode(name):
+    return SETTINGS["poses"]["modes"].get(name, SETTINGS["poses"]["mode"])
+
+
 def has_poses(sequence):
-    return bool(sequence.session) and has(sequence, "imu")
+    estimated = poses_mode(sequence.id) == "estimate"
+    needed = SETTINGS["odometry"]["lidars"] if estimated else []
+    return bool(sequence.session) and has(sequence, "imu", *needed)
+
+
+def is_estimated(sequence):
+    return has_poses(sequence) and poses_mode(sequence.id) == "estimate"
 
 
 def has_map(sequence):
@@ -110,6 +120,20 @@ def delivered_trajectory(wildcards):
     }
 
 
+def trajectory_source(wildcards):
+    """What the poses of a sequence are made from: its own pose graph, or what was delivered with it."""
+    if poses_mode(wildcards.id) == "estimate":
+        return {"refined": rules.pose_graph.output.trajectory}
+    return delivered_trajectory(wildcards)
+
+
+def poses_cfg(wildcards):
+    """Settings and gates of the poses with only the sequence's own mode."""
+    chosen = cfg("poses")
+    own = {"mode": poses_mode(wildcards.id), "modes": {}}
+    return {**chosen, "settings": {**chosen["settings"], **own}}
+
+
 def privacy_cfg(wildcards):
     """Settings and gates of the privacy stage with only those overrides that are signed for the sequence."""
     chosen = cfg("privacy")
@@ -133,6 +157,7 @@ def stages_of(sequence):
     """The stages whose modalities a sequence has."""
     planned = {
         "calibration": bool(sequence.session),
+        **dict.fromkeys(("odometry", "pose_graph"), is_estimated(sequence)),
         "poses": has_poses(sequence),
         "ground_truth": has_map(sequence),
         "wheels": has_map(sequence),

@@ -1,13 +1,17 @@
-"""Take over a delivered trajectory and anchor it in the world frame."""
+"""Check the trajectory of a drive, estimated or delivered, and anchor it in the world frame."""
 
 from pathlib import Path
 
 from card.artifacts import logged
 from card.poses.import_trajectory import import_trajectory
+from card.poses.take_refined import take_refined
+
+estimated = snakemake.params.cfg["settings"]["mode"] == "estimate"
+read, source = (take_refined, "refined") if estimated else (import_trajectory, "delivered")
 
 with logged(Path(snakemake.log[0])):
-    import_trajectory(
-        delivered=Path(snakemake.input.delivered),
+    read(
+        **{source: Path(snakemake.input[source])},
         recording=Path(snakemake.params.recording),
         calibration=Path(snakemake.input.calibration),
         bursts=Path(snakemake.input.bursts),

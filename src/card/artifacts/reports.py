@@ -21,6 +21,8 @@ LIBRARIES = (
     "lazrs",
     "pyarrow",
     "small-gicp",
+    "gtsam",
+    "numba",
     "jpeglib",
     "onnxruntime",
     "pycocotools",

@@ -47,6 +47,10 @@ class Imu:
         )
         return Imu(t_ns, gyro, accel)
 
+    def backwards(self) -> "Imu":
+        """The samples from the last to the first."""
+        return Imu(self.t_ns[::-1], self.gyro[::-1], self.accel[::-1])
+
     def without(self, gyro_bias: Array, accel_bias: Array) -> "Imu":
         """The samples less biases (3,) or, one a sample, (N, 3)."""
         return Imu(self.t_ns, self.gyro - gyro_bias, self.accel - accel_bias)

@@ -71,6 +71,10 @@ class PlaneMap:
         for level in self._levels:
             level.insert(points)
 
+    def thickness(self) -> Array:
+        """Standard deviations (V,) of the points across the planes of the smaller voxels, m."""
+        return self._levels[0].thickness()
+
     def register(self, points: Array, guess: Array, iterations: int = 12, widen: float = 1.0) -> Registration:
         """The pose of points (N, 3) in the map, from a guess of map_from_scan (4, 4).
 
@@ -135,6 +139,10 @@ class _Level:
             s.max_thickness_m,
             s.min_spread_m,
         )
+
+    def thickness(self) -> Array:
+        planes = self._planes[: self.used]
+        return np.asarray(np.sqrt(planes[planes[:, kernels.VALID] > 0, kernels.THIN]))
 
     def linearize(
         self, points: Array, pending: NDArray[np.bool_], pose: Array, cut: float, H: Array, b: Array

@@ -26,13 +26,17 @@ class Path:
         pose[:, :3, :3], pose[:, :3, 3] = self.rotation, self.position
         return pose
 
+    def backwards(self) -> "Path":
+        """The states from the last to the first."""
+        return Path(self.t_ns[::-1], self.rotation[::-1], self.position[::-1], self.velocity[::-1])
+
 
 def integrate(imu: Imu, pose: Array, velocity: Array, gravity: Array) -> Path:
     """Integrate samples (N,), free of bias, from a pose (4, 4) and velocity (3,) at the first one.
 
     gravity : (3,) m/s^2 in the fixed frame, pointing down. Both rate and specific force are taken as linear
-    between samples; the force is turned with the attitude in the middle of each step (P. Savage, "Strapdown
-    Inertial Navigation Integration Algorithm Design", JGCD 1998, to second order).
+    between samples, whose times may also fall; the force is turned with the attitude in the middle of each
+    step, to second order (P. Savage, "Strapdown Inertial Navigation Integration Algorithm Design", 1998).
     """
     seconds = np.diff(imu.t_ns) * 1e-9
     turns = exp_so3(0.5 * (imu.gyro[1:] + imu.gyro[:-1]) * seconds[:, None])

@@ -1,4 +1,4 @@
-"""Poses of a sequence: from a delivered trajectory."""
+"""Poses of a sequence: estimated from LiDAR and IMU, or from a delivered trajectory."""
 
 from card.poses.import_trajectory import import_trajectory
 

@@ -1,95 +1,38 @@
-"""Import mode of the poses: the trajectory of another system, checked and brought to ``world``."""
+"""Import mode of the poses: the trajectory of another system."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from card.artifacts import Figure, read_json, read_table, write_json, write_report, write_table
-from card.estimation.imu import Imu, read_imu
-from card.geometry import Trajectory, from_json, inverse, quaternion_from_matrix
-from card.poses.anchor import anchor, tilt_deg, up_vector
+from card.artifacts import read_json
+from card.geometry import from_json
+from card.poses.anchor import up_vector
 from card.poses.delivered import read_kitti, read_tum
-from card.poses.imu_checks import imu_figures
-from card.poses.members import pose_document, read_members
-from card.poses.plausibility import check_coverage, check_motion, check_upright
-from card.recording.description import read_description
-from card.recording.paths import imu_path
-
-WORLD_UP = np.array([0.0, 0.0, 1.0])
+from card.poses.finish import Source, write_poses
 
 
 def import_trajectory(
-    *,
-    delivered: Path,
-    recording: Path,
-    calibration: Path,
-    bursts: Path,
-    frames: Path,
-    trajectory: Path,
-    poses: Path,
-    report: Path,
-    settings: Mapping[str, Any],
-    gates: Sequence[Mapping[str, Any]],
+    *, delivered: Path, calibration: Path, settings: Mapping[str, Any], **stage: Any
 ) -> None:
     """Read the trajectory a recording was delivered with and write it as the poses of the sequence.
 
     Parameters
     ----------
     delivered : trajectory file in the format that the settings name; the times of a KITTI one lie beside it.
-    recording : folder with ``recording.yaml`` and, if the car has an IMU, ``imu.parquet``.
-    calibration, bursts, frames : artifacts of schemas ``calibration``, ``bursts`` and ``frames``.
-    trajectory, poses, report : the files to write, of schemas ``trajectory``, ``poses`` and ``report``.
+    stage : as `write_poses` takes them.
 
     Raises
     ------
     CardError
-        For a file that cannot be read, a trajectory no car can drive, a wrong frame, axis or quaternion
-        order, or bursts and images that are not covered.
+        For a file that cannot be read; also as `write_poses`.
     """
     t_ns, delivered_from_sensor = _read(delivered, settings)
     rig_from_sensor = _rig_from_sensor(calibration, settings["frame"])
-    up = up_vector(settings["up_axis"])
-    check_upright(delivered_from_sensor, rig_from_sensor, up, settings["max_tilt_deg"], delivered)
-    world_from_rig = anchor(delivered_from_sensor @ inverse(rig_from_sensor), up)
-    motion = check_motion(t_ns, world_from_rig[:, :3, 3], settings, delivered)
-    members = read_members(read_table(bursts, "bursts"), read_table(frames, "frames"))
-    check_coverage((int(t_ns[0]), int(t_ns[-1])), {**members.bursts, **members.images}, delivered)
-
-    anchored = Trajectory(t_ns, world_from_rig[:, :3, 3], quaternion_from_matrix(world_from_rig[:, :3, :3]))
-    inputs = {"trajectory": delivered, "calibration": calibration, "bursts": bursts, "frames": frames}
-    figures = _figures(t_ns, world_from_rig, motion)
-    notes = []
-    result = anchored
-    if imu_path(recording).is_file():
-        inputs["imu"] = imu_path(recording)
-        imu = read_imu(read_table(imu_path(recording), "imu"), anchored.start_ns, anchored.end_ns)
-        imu_agreement, causes = imu_figures(imu, anchored, settings["imu_window_s"])
-        figures += imu_agreement
-        notes += causes
-        result = _resample(anchored, imu, settings["max_gap_s"])
-    else:
-        notes.append("no IMU: the trajectory keeps its delivered times and gravity is not checked")
-
-    rate_hz = (len(t_ns) - 1) / float((t_ns[-1] - t_ns[0]) * 1e-9)
-    if rate_hz < 0.99 * settings["min_rate_hz"]:
-        notes.append(f"poses were delivered at {rate_hz:.0f} Hz: between them the path is a straight line")
-
-    write_table(trajectory, result.to_table(), "trajectory")
-    write_json(poses, pose_document(members, result), "poses")
-    write_report(
-        report,
-        stage="poses",
-        sequence=read_description(recording)["id"],
-        settings=settings,
-        inputs=inputs,
-        counts={"delivered_poses": len(t_ns), "poses": len(result.t_ns)},
-        figures=figures,
-        gates=gates,
-        notes=notes,
-    )
+    source = Source(delivered, t_ns, delivered_from_sensor, rig_from_sensor, up_vector(settings["up_axis"]))
+    write_poses(source, calibration=calibration, settings=settings, **stage)
 
 
 def _read(delivered: Path, settings: Mapping[str, Any]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
@@ -102,33 +45,3 @@ def _rig_from_sensor(calibration: Path, frame: str) -> NDArray[np.float64]:
     if frame == "rig":
         return np.eye(4)
     return from_json(read_json(calibration, "calibration")["extrinsics"][f"rig_from_{frame}"])
-
-
-def _resample(anchored: Trajectory, imu: Imu, max_gap_s: float) -> Trajectory:
-    """The trajectory at the IMU's times; where the IMU has a gap, delivered poses stay."""
-    after = np.searchsorted(imu.t_ns, anchored.t_ns, side="left")
-    ends = np.concatenate([[np.iinfo(np.int64).min // 2], imu.t_ns, [np.iinfo(np.int64).max // 2]])
-    in_gap = ends[after + 1] - ends[after] > max_gap_s * 1e9
-    times = np.union1d(imu.t_ns, anchored.t_ns[in_gap])
-    poses = anchored.at(times)
-    return Trajectory(times, poses[:, :3, 3], quaternion_from_matrix(poses[:, :3, :3]))
-
-
-def _figures(
-    t_ns: NDArray[np.int64], world_from_rig: NDArray[np.float64], motion: Mapping[str, float]
-) -> list[Figure]:
-    span_s = float(t_ns[-1] - t_ns[0]) / 1e9
-    length = float(np.linalg.norm(np.diff(world_from_rig[:, :3, 3], axis=0), axis=1).sum())
-    return [
-        Figure("duration_s", span_s, "s", "span of the delivered trajectory"),
-        Figure("length_m", length, "m", "length of the delivered trajectory"),
-        Figure("delivered_rate_hz", (len(t_ns) - 1) / span_s, "Hz", "mean rate of the delivered trajectory"),
-        Figure("max_gap_s", motion["max_gap_s"], "s", "longest time between delivered poses"),
-        Figure("max_speed_m_s", motion["max_speed_m_s"], "m/s", "greatest speed of the rig"),
-        Figure(
-            "median_tilt_deg",
-            float(np.median(tilt_deg(world_from_rig, WORLD_UP))),
-            "deg",
-            "median angle between the rig's z and up",
-        ),
-    ]

@@ -53,7 +53,7 @@ def imu_figures(imu: Imu, trajectory: Trajectory, window_s: float) -> tuple[list
         rotation_error = float(np.degrees(_median_error(integrated, windows.rotated)))
         notes += gyro_cause(imu, windows)
         if windows.turns:
-            offset_ms = 1e3 * clock_offset(imu, windows)
+            offset_ms = 1e3 * clock_offset(imu, windows)[0]
         up = mean_specific_force(imu, trajectory, window_s)
         magnitude = float(np.linalg.norm(up))
         gravity_error = float(np.degrees(np.arccos(np.clip(up[2] / magnitude, -1.0, 1.0))))
@@ -113,10 +113,11 @@ def integrated_gyro(imu: Imu, edges_ns: NDArray[np.int64], shift_s: float = 0.0)
     return np.diff(np.stack([np.interp(at, seconds, total[:, axis]) for axis in range(3)], axis=1), axis=0)
 
 
-def clock_offset(imu: Imu, windows: Windows) -> float:
-    """Seconds to add to the trajectory's times to have the IMU's, from the sizes of their rotations.
+def clock_offset(imu: Imu, windows: Windows) -> tuple[float, float]:
+    """Seconds to add to the trajectory's times to have the IMU's, from the sizes of rotations, and its sigma.
 
-    Sizes, so that swapped axes do not hide an offset.
+    Sizes, so that swapped axes do not hide an offset. The sigma is that of a least-squares fit: the misfit
+    that is left, over the misfit's curvature.
     """
     wanted = np.linalg.norm(windows.rotated, axis=1)
 
@@ -128,7 +129,11 @@ def clock_offset(imu: Imu, windows: Windows) -> float:
     shifts = np.arange(-LARGEST_OFFSET_S, LARGEST_OFFSET_S + 1e-9, OFFSET_STEP_S)
     best = float(shifts[int(np.argmin([misfit(shift) for shift in shifts]))])
     bounds = (best - OFFSET_STEP_S, best + OFFSET_STEP_S)
-    return float(minimize_scalar(misfit, bounds=bounds, method="bounded", options={"xatol": 1e-5}).x)
+    found = float(minimize_scalar(misfit, bounds=bounds, method="bounded", options={"xatol": 1e-5}).x)
+    left, h = misfit(found), OFFSET_STEP_S
+    curvature = (misfit(found - h) - 2 * left + misfit(found + h)) / (2 * h * h)
+    variance = left / max(len(wanted) - 2, 1) / curvature if curvature > 0 else np.inf
+    return found, float(np.sqrt(variance))
 
 
 def mean_specific_force(imu: Imu, trajectory: Trajectory, window_s: float) -> Array:
@@ -148,7 +153,7 @@ def gyro_cause(imu: Imu, windows: Windows) -> list[str]:
     """The unit and axes that explain the gyro much better than what it claims to be."""
     if not windows.turns:
         return []
-    shift = clock_offset(imu, windows)
+    shift, _ = clock_offset(imu, windows)
     integrated = integrated_gyro(imu, windows.edges_ns, shift)
     best, cause = _median_error(integrated, windows.rotated) / MUCH_BETTER, []
     for scale, unit in ((1.0, "rad/s"), (np.pi / 180, "deg/s")):

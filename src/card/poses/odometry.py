@@ -102,11 +102,9 @@ class Odometry:
 
     def begin(self, scan: Scan) -> None:
         """Start the map with the sweep that ends at the first state, whose motion goes back from there."""
-        back = self._imu.between(scan.start_ns, scan.end_ns)
-        reverse = Imu(back.t_ns[::-1], back.gyro[::-1], back.accel[::-1])
-        path = self._integrate(reverse, self.states[0])
-        forward = Path(path.t_ns[::-1], path.rotation[::-1], path.position[::-1], path.velocity[::-1])
-        self._insert(scan.at_end(forward), self.states[0].pose)
+        back = self._imu.between(scan.start_ns, scan.end_ns).backwards()
+        path = self._integrate(back, self.states[0]).backwards()
+        self._insert(scan.at_end(path), self.states[0].pose)
 
     def add(self, scan: Scan) -> tuple[State, Registration | None]:
         """Take a sweep that ends after the last state."""

@@ -23,6 +23,8 @@ from card.poses.odometry import covered_sweeps
 
 #: Angle between mean specific force and the rig's z above which no car stands or drives, deg.
 MAX_TILT_DEG = 45.0
+#: An offset of the clocks must exceed its limit by this many of its standard deviations.
+SURE_SIGMAS = 3.0
 
 
 def check_imu(imu: Imu, max_gap_s: float, where: Path) -> None:
@@ -66,7 +68,7 @@ def check_against_scans(
     CardError
         If another unit or order of axes explains the IMU much better, or the clocks differ.
     """
-    offset_ms = error_deg = None
+    offset_ms = sigma_ms = error_deg = None
     notes = []
     chosen = _liveliest(scans, imu, settings["check_s"])
     try:
@@ -76,7 +78,7 @@ def check_against_scans(
     else:
         windows = windows_of(imu, path, settings["imu_window_s"])
         if windows.turns:
-            offset_ms = 1e3 * clock_offset(imu, windows)
+            offset_ms, sigma_ms = (1e3 * value for value in clock_offset(imu, windows))
             shifted = integrated_gyro(imu, windows.edges_ns, 1e-3 * offset_ms)
             error_deg = float(np.degrees(np.median(np.linalg.norm(shifted - windows.rotated, axis=1))))
             causes = gyro_cause(imu, windows) + accel_cause(imu, path, windows.edges_ns)
@@ -84,7 +86,7 @@ def check_against_scans(
                 raise CardError(
                     "IMU and scans tell of different motions", where=where, found="; ".join(causes)
                 )
-            if abs(offset_ms) > settings["max_clock_offset_ms"]:
+            if abs(offset_ms) - SURE_SIGMAS * sigma_ms > settings["max_clock_offset_ms"]:
                 raise CardError(
                     "clocks of LiDAR and IMU differ",
                     where=where,
@@ -95,6 +97,7 @@ def check_against_scans(
             notes.append("the car turns too little to compare the clocks and axes of LiDAR and IMU")
     figures = [
         Figure("clock_offset_ms", offset_ms, "ms", "by how much the IMU's clock is ahead of the LiDAR's"),
+        Figure("clock_offset_sigma_ms", sigma_ms, "ms", "standard deviation of that offset"),
         Figure(
             "scan_gyro_error_deg",
             error_deg,

@@ -21,6 +21,8 @@ CHAIN = (
     "import_bag",
     "ingest",
     "calibration",
+    "odometry",
+    "pose_graph",
     "poses",
     "ground_truth",
     "wheels",
