@@ -5,6 +5,7 @@ from pathlib import Path
 import gtsam
 import numpy as np
 import pytest
+from gtsam.symbol_shorthand import B, G
 from scipy.spatial.transform import Rotation
 
 from card.estimation.batch import Batch, Between, Nodes, between_error, residuals, write_g2o
@@ -136,6 +137,20 @@ def test_false_loops_among_true_ones_let_go(imu: Imu, offset: float) -> None:
     found, weights = robust(batch, pulled, steps, [*good, *bad])
     assert weights[: len(good)].min() > OUTLIER > weights[len(good) :].max()
     assert worst(found, true) < 0.2
+
+
+def test_sigmas_are_those_of_gtsam_where_it_has_any(imu: Imu) -> None:
+    start, steps = chained(true_nodes())
+    batch = Batch(imu, start, NOISE)
+    batch.solve(start, steps)
+    sigma = batch.uncertainty([3, 100])
+    marginals = gtsam.Marginals(batch._graph, batch._values)
+    for row, k in enumerate((3, 100)):
+        witness = np.sqrt(np.diag(marginals.marginalCovariance(B(k))))
+        np.testing.assert_allclose(sigma.accel_biases[row], witness[:3], rtol=1e-4)
+        np.testing.assert_allclose(sigma.gyro_biases[row], witness[3:], rtol=1e-4)
+    witness = np.sqrt(np.diag(marginals.marginalCovariance(G(0))))
+    np.testing.assert_allclose(sigma.gravity, witness, rtol=1e-4)
 
 
 def test_the_residual_of_a_relative_pose_is_what_it_is_off_by() -> None:

@@ -7,6 +7,8 @@ import gtsam
 import numpy as np
 from gtsam.symbol_shorthand import B, G, V, X
 from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.linalg import splu
 
 from card.estimation.imu import Imu, ImuNoise
 from card.estimation.preintegration import parameters, preintegrate
@@ -15,7 +17,7 @@ from card.geometry import quaternion_from_matrix
 Array = NDArray[np.float64]
 Sigmas = gtsam.noiseModel.Diagonal.Sigmas
 #: The first pose only fixes the frame; velocity (m/s) and direction of gravity (rad) at the start are free.
-FIXED, FREE_VELOCITY, FREE_GRAVITY = np.full(6, 1e-6), np.full(3, 30.0), np.full(2, 0.5)
+FIXED, FREE_VELOCITY, FREE_GRAVITY = np.full(6, 1e-5), np.full(3, 30.0), np.full(2, 0.5)
 MAX_ITERATIONS = 20
 
 
@@ -92,11 +94,29 @@ class Batch:
         return np.sqrt(np.array(chi2) / 15)
 
     def uncertainty(self, nodes: Sequence[int]) -> Uncertainty:
-        """Standard deviations at the last solution."""
-        marginals = gtsam.Marginals(self._graph, self._values)
-        bias = np.array([np.sqrt(np.diag(marginals.marginalCovariance(B(k)))) for k in nodes])
-        gravity = np.sqrt(np.diag(marginals.marginalCovariance(G(0))))
-        return Uncertainty(np.asarray(nodes, dtype=np.intp), bias[:, 3:], bias[:, :3], gravity)
+        """Standard deviations at the last solution.
+
+        gtsam's own marginals break down where units lie far apart: here the normal equations are scaled.
+        """
+        linear = self._graph.linearize(self._values)
+        rows, columns, entries = linear.sparseJacobian_()
+        # One-based; the last column is the right-hand side.
+        size = self._values.dim()
+        inside = columns <= size
+        shape = (int(rows.max()), size)
+        place = rows[inside].astype(np.int64) - 1, columns[inside].astype(np.int64) - 1
+        jacobian = sparse.csc_matrix((entries[inside], place), shape=shape)
+        normal = (jacobian.T @ jacobian).tocsc()
+        scale = 1.0 / np.sqrt(normal.diagonal())
+        solve = splu((sparse.diags(scale) @ normal @ sparse.diags(scale)).tocsc()).solve
+        count = self._imu.size() + 1
+        # Keys are in order of their letters: biases, gravity, then velocities and poses.
+        wanted = [6 * k + i for k in nodes for i in range(6)] + [6 * count, 6 * count + 1]
+        unit = np.zeros((size, len(wanted)))
+        unit[wanted, np.arange(len(wanted))] = 1.0
+        sigma = scale[wanted] * np.sqrt(solve(unit)[wanted, np.arange(len(wanted))])
+        bias = sigma[:-2].reshape(-1, 6)
+        return Uncertainty(np.asarray(nodes, dtype=np.intp), bias[:, 3:], bias[:, :3], sigma[-2:])
 
     def _priors(self, start: Nodes) -> gtsam.NonlinearFactorGraph:
         graph = gtsam.NonlinearFactorGraph()

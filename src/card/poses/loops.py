@@ -117,9 +117,11 @@ class LoopVerifier:
         """Planes of the sweeps within reach along the way, in the first node's frame."""
         if self._map is None or self._map[0] != first:
             way, spacing = travelled(poses), self._settings["loop_map_spacing_m"]
+            # Nothing of the later visit may get into the map of the earlier one.
+            reach = min(self._settings["loop_map_m"], self._settings["loop_min_way_m"] / 2)
             grid = PlaneMap(self._planes)
             last = -np.inf
-            for k in np.flatnonzero(np.abs(way - way[first]) <= self._settings["loop_map_m"]):
+            for k in np.flatnonzero(np.abs(way - way[first]) <= reach):
                 if way[k] - last >= spacing or k == first:
                     last = way[k]
                     relative = inverse(poses[first]) @ poses[k]

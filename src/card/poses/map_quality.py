@@ -45,7 +45,9 @@ def map_figures(
         pairs = candidates(
             poses, settings["quality_spacing_m"], settings["revisit_radius_m"], settings["revisit_min_way_m"]
         )
-        heights = np.array([_height(store, poses, *pair) for pair in pairs])
+        # The map of an earlier visit must hold nothing of the later one.
+        reach_m = min(AROUND_M, settings["revisit_min_way_m"] / 2)
+        heights = np.array([_height(store, poses, *pair, reach_m) for pair in pairs])
         heights = heights[np.isfinite(heights)]
     return [
         Figure(
@@ -90,14 +92,14 @@ def _thickness(store: SweepStore, poses: Array) -> float | None:
     return 1e3 * float(np.median(values)) if len(values) else None
 
 
-def _height(store: SweepStore, poses: Array, first: int, second: int) -> float:
+def _height(store: SweepStore, poses: Array, first: int, second: int, reach_m: float) -> float:
     """By how much (m, along z) a later sweep has to move to fit the sweeps around an earlier one.
 
     NaN where it does not fit.
     """
     way = travelled(poses)
     grid = PlaneMap(PlaneSettings())
-    for k in np.flatnonzero(np.abs(way - way[first]) <= AROUND_M):
+    for k in np.flatnonzero(np.abs(way - way[first]) <= reach_m):
         grid.insert(apply(poses[k], store.points(int(k))))
     points = voxel_means(store.points(second), SCAN_LEAF_M)
     found = grid.register(points, poses[second], widen=4.0)

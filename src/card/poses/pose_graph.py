@@ -24,8 +24,8 @@ from card.recording.description import read_description
 from card.recording.paths import imu_path
 
 Array = NDArray[np.float64]
-#: Nodes between two whose biases' uncertainty is worked out.
-SIGMA_EVERY = 10
+#: Nodes at which the uncertainty of the biases is worked out.
+SIGMA_NODES = 50
 
 
 def refine_odometry(
@@ -66,8 +66,8 @@ def refine_odometry(
     refined = refine(
         batch, start, local_constraints(start, information, registered, settings), verifier.verify, settings
     )
-    picked = sorted({*range(0, len(start.t_ns), SIGMA_EVERY), len(start.t_ns) - 1})
-    uncertainty = batch.uncertainty(picked)
+    picked = np.unique(np.linspace(0, len(start.t_ns) - 1, SIGMA_NODES).astype(int))
+    uncertainty = batch.uncertainty([int(k) for k in picked])
 
     dense = dense_trajectory(refined.nodes, imu, settings["beyond_s"])
     world_from_odometry = _world(dense, refined.nodes.gravity)
