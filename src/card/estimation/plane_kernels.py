@@ -10,9 +10,14 @@ Integers = NDArray[np.int64]
 EMPTY = np.int64(-1)
 #: Columns of a voxel's moments: count, sum (3) and sum of products (6), about the voxel's centre.
 MOMENTS = 10
-#: Columns of a voxel's plane: mean (3), normal (3), smallest and middle eigenvalue, count when fitted, valid.
-PLANE = 10
-MEAN, NORMAL, THIN, MIDDLE, FITTED, VALID = 0, 3, 6, 7, 8, 9
+#: Columns of a voxel's surface: mean (3), normal (3), smallest and middle eigenvalue, count when fitted,
+#: kind; of a blob also its information (6), row by row from the diagonal on.
+PLANE = 16
+MEAN, NORMAL, THIN, MIDDLE, FITTED, VALID, BLOB = 0, 3, 6, 7, 8, 9, 10
+#: Kinds: too little is known; flat; anything else, such as a trunk or a bush.
+UNKNOWN, IS_PLANE, IS_BLOB = 0.0, 1.0, 2.0
+#: Standard deviation below which a blob is not known, m: its points are few and lie anywhere on it.
+BLOB_SIGMA = 0.05
 #: A plane is fitted anew when its voxel has grown by this share.
 GROWTH = 1.1
 _BIAS, _BITS = 1 << 20, 21
@@ -161,7 +166,17 @@ def fit_planes(
         plane[THIN] = max(scatter[low, low], 0.0)
         plane[MIDDLE] = scatter[middle, middle]
         flat = plane[THIN] < max_thickness**2 and plane[MIDDLE] > min_spread**2
-        plane[VALID] = 1.0 if flat and low != high else 0.0
+        if flat and low != high:
+            plane[VALID] = IS_PLANE
+            continue
+        plane[VALID] = IS_BLOB
+        column = BLOB
+        for i in range(3):
+            for j in range(i, 3):
+                plane[column] = 0.0
+                for e in range(3):
+                    plane[column] += vectors[i, e] * vectors[j, e] / (scatter[e, e] + BLOB_SIGMA**2)
+                column += 1
 
 
 @numba.njit(cache=True)
@@ -177,16 +192,16 @@ def linearize(
     kernel2: float,
     H: Array,
     b: Array,
-) -> tuple[int, int, float]:
-    """Add to the normal equations the points (N, 3) that are open (N,) and fall on a plane, and close those.
+) -> tuple[int, int, float, float]:
+    """Add to the normal equations the points (N, 3) that are pending (N,) and fall on a plane: settle them.
 
-    Returns points on planes, inliers, sum of squares (m^2).
+    Returns points on planes, inliers, sum of squares (m^2) and of the kernel's weights.
 
     Residual: distance of the moved point from its voxel's plane. Its variance is that of the plane's
     thickness, of the fitted plane at that place, and the floor. Tukey's kernel cuts at kernel2 variances.
     """
     J = np.empty(6)
-    known, inliers, squares = 0, 0, 0.0
+    known, inliers, squares, score = 0, 0, 0.0, 0.0
     for n in range(len(points)):
         if not pending[n]:
             continue
@@ -195,7 +210,7 @@ def linearize(
         y = pose[1, 0] * px + pose[1, 1] * py + pose[1, 2] * pz + pose[1, 3]
         z = pose[2, 0] * px + pose[2, 1] * py + pose[2, 2] * pz + pose[2, 3]
         slot = table[find(table, keys, voxel_key(x, y, z, leaf))]
-        if slot == EMPTY or planes[slot, VALID] == 0.0:
+        if slot == EMPTY or planes[slot, VALID] != IS_PLANE:
             continue
         plane = planes[slot]
         known += 1
@@ -209,6 +224,7 @@ def linearize(
             continue
         inliers += 1
         squares += r * r
+        score += (1.0 - u) ** 2
         w = (1.0 - u) ** 2 / variance
         nx = pose[0, 0] * plane[NORMAL] + pose[1, 0] * plane[NORMAL + 1] + pose[2, 0] * plane[NORMAL + 2]
         ny = pose[0, 1] * plane[NORMAL] + pose[1, 1] * plane[NORMAL + 1] + pose[2, 1] * plane[NORMAL + 2]
@@ -221,7 +237,7 @@ def linearize(
             b[i] -= w * r * J[i]
             for j in range(i, 6):
                 H[i, j] += w * J[i] * J[j]
-    return known, inliers, squares
+    return known, inliers, squares, score
 
 
 @numba.njit(cache=True)

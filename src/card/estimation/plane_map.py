@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from card.estimation import plane_kernels as kernels
+from card.estimation.blob_kernels import linearize_blobs
 
 Array = NDArray[np.float64]
 #: How far a registration may lie from its guess where nothing in the map says more (one sigma): rad, m.
@@ -46,6 +47,7 @@ class Registration:
     information : (6, 6) of the pose, in the scan's own axes: rotation (1/rad^2) before translation (1/m^2).
     known_fraction, inlier_fraction : shares of the scan's points that fall on planes of the map, and fit.
     rms_m : root mean square distance of the inliers from their planes.
+    score : mean weight of all points, on planes or not: how well the scan fits as a whole.
     """
 
     map_from_scan: Array
@@ -53,10 +55,11 @@ class Registration:
     known_fraction: float
     inlier_fraction: float
     rms_m: float
+    score: float
 
 
 class PlaneMap:
-    """Planes of voxels of `leaf_m`, and of twice that where those have none; all in one frame, metres."""
+    """Planes of voxels of `leaf_m`, of twice that where those have none, and blobs; one frame, metres."""
 
     def __init__(self, settings: PlaneSettings, horizon: int | None = None) -> None:
         """horizon : insertions after which a voxel that none of them touched is forgotten; None for never."""
@@ -83,28 +86,29 @@ class PlaneMap:
         pose: Array = np.array(guess, dtype=np.float64)
         H, b = np.zeros((6, 6)), np.zeros(6)
         known = inliers = 0
-        squares = 0.0
+        squares = score = 0.0
         weak = np.diag(LOOSE**-2)
         for k in range(iterations):
             cut = self.settings.kernel_sigmas * (widen if 2 * k < iterations else 1.0)
-            known, inliers, squares = self._linearize(points, pose, cut, H, b)
+            known, inliers, squares, score = self._linearize(points, pose, cut, H, b)
             step = np.linalg.solve(H + weak, b).astype(np.float64)
             pose = pose @ _exp(step)
             if np.all(np.abs(step) < _CONVERGED) and (widen == 1.0 or 2 * k >= iterations):
                 break
         count = max(len(points), 1)
         rms = float(np.sqrt(squares / inliers)) if inliers else 0.0
-        return Registration(pose, H, known / count, inliers / count, rms)
+        return Registration(pose, H, known / count, inliers / count, rms, score / count)
 
     def _linearize(
         self, points: Array, pose: Array, cut: float, H: Array, b: Array
-    ) -> tuple[int, int, float]:
+    ) -> tuple[int, int, float, float]:
         H[:], b[:] = 0.0, 0.0
         pending = np.ones(len(points), dtype=bool)
         sums = [level.linearize(points, pending, pose, cut, H, b) for level in self._levels]
+        score = sum(level.linearize_blobs(points, pending, pose, cut, H, b) for level in self._levels)
         H[:] = np.triu(H) + np.triu(H, 1).T
-        known, inliers, squares = (sum(values) for values in zip(*sums, strict=True))
-        return int(known), int(inliers), float(squares)
+        known, inliers, squares, fits = (sum(values) for values in zip(*sums, strict=True))
+        return int(known), int(inliers), float(squares), float(fits + score)
 
 
 class _Level:
@@ -142,14 +146,20 @@ class _Level:
 
     def thickness(self) -> Array:
         planes = self._planes[: self.used]
-        return np.asarray(np.sqrt(planes[planes[:, kernels.VALID] > 0, kernels.THIN]))
+        return np.asarray(np.sqrt(planes[planes[:, kernels.VALID] == kernels.IS_PLANE, kernels.THIN]))
 
     def linearize(
         self, points: Array, pending: NDArray[np.bool_], pose: Array, cut: float, H: Array, b: Array
-    ) -> tuple[int, int, float]:
+    ) -> tuple[int, int, float, float]:
         planes = self._table, self._keys, self._planes
         floor2 = self._settings.sigma_m**2
         return kernels.linearize(*planes, points, pending, pose, self._leaf_m, floor2, cut**2, H, b)
+
+    def linearize_blobs(
+        self, points: Array, pending: NDArray[np.bool_], pose: Array, cut: float, H: Array, b: Array
+    ) -> float:
+        planes = self._table, self._keys, self._planes
+        return float(linearize_blobs(*planes, points, pending, pose, self._leaf_m, cut**2, H, b))
 
     def _reserve(self, count: int) -> None:
         if count > len(self._keys):

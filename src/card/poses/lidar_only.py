@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 #: Speeds along the rig's y that the first two scans are tried with, m/s; each converges some metres around.
 SPEEDS = (0.0, 5.0, 10.0, 15.0, 20.0, 27.0, 34.0, 41.0, 48.0, 55.0, -4.0)
 #: Share of points that must fit for a pair of scans to be registered at all.
-MIN_INLIERS = 0.15
+MIN_SCORE = 0.15
 _KNOTS = 11
 _WIDEN = 10.0
 
@@ -62,7 +62,7 @@ def straightened(scan: Scan, twist: Array, leaf_m: float) -> Array:
 
 def _first_twist(first: Scan, second: Scan, leaf_m: float, planes: PlaneSettings) -> Array:
     seconds = (second.end_ns - first.end_ns) * 1e-9
-    best: tuple[float, Array, Registration] | None = None
+    best: tuple[Registration, Array] | None = None
     for speed in SPEEDS:
         twist = np.array([0, 0, 0, 0, speed, 0.0])
         for _ in range(2):
@@ -71,16 +71,15 @@ def _first_twist(first: Scan, second: Scan, leaf_m: float, planes: PlaneSettings
             points = straightened(second, twist, leaf_m)
             found = grid.register(points, _moved(twist, seconds), iterations=20, widen=_WIDEN)
             twist = _twist(found.map_from_scan, seconds)
-        score = found.inlier_fraction
-        if best is None or score > best[0]:
-            best = score, twist, found
+        if best is None or found.score > best[0].score:
+            best = found, twist
     assert best is not None
-    if best[0] < MIN_INLIERS:
+    if best[0].score < MIN_SCORE:
         raise CardError(
             "the first scans cannot be registered",
             where=f"scans that end at {first.end_ns} and {second.end_ns} ns",
-            found=f"{100 * best[0]:.0f} % of the points fit",
-            wanted=f"at least {100 * MIN_INLIERS:.0f} %",
+            found=f"{100 * best[0].score:.0f} % of the points fit",
+            wanted=f"at least {100 * MIN_SCORE:.0f} %",
         )
     return best[1]
 

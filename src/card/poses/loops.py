@@ -108,7 +108,7 @@ class LoopVerifier:
             for y in reach:
                 level[:3, 3] = guess[0, 3] + x, guess[1, 3] + y, 0.0
                 found = grid.register(coarse, level, iterations=16, widen=WIDEN)
-                if best is None or found.inlier_fraction > best.inlier_fraction:
+                if best is None or found.score > best.score:
                     best = found
         assert best is not None
         return best.map_from_scan
