@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
-from project import Project
+from project import ESTIMATED, Project
 
 TOWN = "de_town_bumps"
 GERMANY, ITALY = "card-germany", "card-italy"
@@ -94,6 +94,21 @@ def test_a_setting_of_one_stage_reruns_that_stage_and_its_dependents(built: Proj
     expected = {(stage, id) for id in DRIVES for stage in ("wheels", "package")} | tree(GERMANY, ITALY)
     with built.changed("config/config.yaml", "simulation:", "wheels: {knot_spacing_m: 0.25}\nsimulation:"):
         assert built.plan() == expected
+
+
+def test_a_setting_of_the_batch_leaves_the_odometry_and_imported_poses_alone(built: Project) -> None:
+    with built.changed("config/config.yaml", "\nposes:", "\npose_graph: {anchor_m: 11}\nposes:"):
+        plan = built.plan()
+    assert chain(ESTIMATED, "pose_graph", "poses", "ground_truth", "wheels", "package") <= plan
+    assert ("odometry", ESTIMATED) not in plan
+    assert ("poses", TOWN) not in plan
+
+
+def test_another_mode_reruns_the_poses_of_its_sequence_only(built: Project) -> None:
+    with built.changed("config/config.yaml", f"{ESTIMATED}: estimate", f"{ESTIMATED}: import"):
+        plan = built.plan()
+    assert chain(ESTIMATED, "poses", "ground_truth", "wheels", "package") <= plan
+    assert not {("odometry", ESTIMATED), ("pose_graph", ESTIMATED), ("poses", TOWN)} & plan
 
 
 def test_an_override_reruns_only_the_sequence_it_is_signed_for(built: Project) -> None:
