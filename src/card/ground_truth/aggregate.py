@@ -35,6 +35,8 @@ from card.ground_truth.voxels import unpack
 
 #: Frames whose bursts are ordered by voxel at once: more take more memory, fewer more time.
 BLOCK_FRAMES = 40
+#: World points that each process keeps meanwhile: a burst that enters the windows is a keyframe 13 s later.
+FRAME_POINTS = 16_000_000
 
 
 def aggregate(
@@ -105,6 +107,7 @@ class _Work:
 
     def rows(self, tasks: Sequence[_Task]) -> Iterator[dict[str, Any]]:
         """Write the clouds of consecutive frames; yield their rows of schema ``coverage``."""
+        self.drive.keep(FRAME_POINTS)
         workspace = Workspace()
         window = StaticWindow(self.drive, self.static, self.camera, self.settings)
         for start in range(0, len(tasks), BLOCK_FRAMES):

@@ -76,7 +76,7 @@ class Drive:
         poses = trajectory.at(self.end_ns)
         self.origins = np.einsum("bij,bj->bi", poses[:, :3, :3], rig_origins.reshape(-1, 3)) + poses[:, :3, 3]
         self._cache: OrderedDict[int, Sweep] = OrderedDict()
-        self._cached_points = 0
+        self._cached_points, self._limit = 0, CACHE_POINTS
 
     def __len__(self) -> int:
         return len(self.files)
@@ -101,9 +101,14 @@ class Drive:
         sweep = self._read(i)
         self._cache[i] = sweep
         self._cached_points += len(sweep.points)
-        while self._cached_points > CACHE_POINTS and len(self._cache) > 1:
-            self._cached_points -= len(self._cache.popitem(last=False)[1].points)
+        self.keep(self._limit)
         return sweep
+
+    def keep(self, points: int) -> None:
+        """From now on keep no more than this many world points in memory: those last asked for."""
+        self._limit = points
+        while self._cached_points > points and len(self._cache) > 1:
+            self._cached_points -= len(self._cache.popitem(last=False)[1].points)
 
     def _read(self, i: int) -> Sweep:
         burst, lidar = read_burst(self.files[i]), self.sensor(i)
