@@ -53,11 +53,19 @@ def write_images(recording: Path, results: Path, times: list[int], rng: np.rando
             (folder / file).write_bytes(buffer.getvalue())
             (recording / file).write_bytes(b"raw" + buffer.getvalue())
             hashes = (sha256_file(folder / file), sha256_file(recording / file))
-            rows.append((camera, t_ns, file, 32, 24, 0, 0, *hashes, "test", "1"))
+            rows.append((camera, t_ns, file, 32, 24, 0, 0, *hashes, "test"))
     names = ("camera", "t_ns", "file", "width", "height", "redactions", "redacted_pixels", "sha256",
-             "source_sha256", "detector", "detector_version")  # fmt: skip
+             "source_sha256", "detectors")  # fmt: skip
     columns = dict(zip(names, map(list, zip(*rows, strict=True)), strict=True))
     write_table(folder / "images.parquet", columns, "images")
+    boxes = [
+        {"camera": "camera_left", "t_ns": t_ns, "frame": frame, "kind": "face", "x_min": 8, "y_min": 0,
+         "x_max": 16, "y_max": 8, "score": 1.0, "source": "test", "model_sha256": ""}
+        for frame, t_ns in enumerate(times)
+    ]  # fmt: skip
+    write_table(
+        folder / "redactions.parquet", {name: [box[name] for box in boxes] for name in boxes[0]}, "redactions"
+    )
     write_table(folder / "inventory.parquet", inventory(folder), "inventory")
 
 

@@ -23,7 +23,7 @@ from card.artifacts import (
     write_report,
     write_table,
 )
-from card.artifacts.schemas import check, default_settings, load_schema, schema_folder
+from card.artifacts.schemas import check, default_settings, load_schema, schema_folder, with_defaults
 from card.errors import CardError
 
 GATE = {"figure": "rms_mm", "unit": "mm", "better": "lower", "threshold": 2.0}
@@ -324,3 +324,15 @@ def test_a_blank_signature_signs_nothing(field: str) -> None:
     settings = default_settings("privacy") | {"overrides": [override | {field: " "}]}
     with pytest.raises(CardError, match=f"overrides/0/{field} does not fit schema"):
         check(settings, "settings/privacy", "config.yaml")
+
+
+def test_defaults_are_filled_in_within_objects_and_arrays() -> None:
+    inner = {"properties": {"size": {"default": 3}, "anything": True}}
+    schema = {
+        "properties": {"list": {"items": inner, "default": []}, "one": {**inner, "default": {}}, "x": True}
+    }
+    assert with_defaults({"list": [{}, {"size": 4}, 5]}, schema) == {
+        "list": [{"size": 3}, {"size": 4}, 5],
+        "one": {"size": 3},
+    }
+    assert with_defaults({}, schema)["list"] == []

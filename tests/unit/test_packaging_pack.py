@@ -81,6 +81,7 @@ def test_sidecars_and_inventory_are_complete(inputs: dict[str, Any]) -> None:
         "poses.json",
         "provenance.json",
         "quality.json",
+        "redactions.parquet",
         "road_planes.parquet",
         "wheel_excitation.json",
     ]

@@ -199,3 +199,13 @@ def test_all_of_a_release_can_be_extracted_over_the_web(tree: Path, tmp_path: Pa
     with served(tree) as server:
         assert main(["extract", server.address, str(tmp_path)]) == 0
     assert len(list((tmp_path / "de_test").iterdir())) == 4 + 5 * FRAMES
+
+
+def test_the_mask_of_an_image_is_what_was_filled(tree: Path) -> None:
+    release = Release(tree)
+    mask = release.redaction_mask("de_test", 2)
+    model = release.calibration("de_test")["cameras"]["camera_left"]
+    assert mask.shape == (model["height"], model["width"])
+    assert mask[:8, 8:16].all()
+    assert mask.sum() == 64
+    assert not release.redaction_mask("de_test", 2, "camera_right").any()

@@ -117,9 +117,11 @@ def test_only_the_shards_of_the_frame_are_written_again(project: Project) -> Non
     for path in (tree / "sequences").rglob("*"):
         assert (
             path.is_dir()
-            or path.name == "provenance.json"
+            or path.name in ("provenance.json", "redactions.parquet")
             or path.read_bytes() == (kept / path.relative_to(tree)).read_bytes()
         )
+    left = read_table(tree / "sequences/de_test/redactions.parquet", "redactions")["frame"].to_pylist()
+    assert left == [frame for frame in range(FRAMES) if frame != 4]
 
 
 def test_tombstones_tell_what_and_why_but_not_who(project: Project) -> None:

@@ -7,6 +7,12 @@ from scipy.stats import binomtest
 from card.errors import CardError
 from card.privacy.recall import LabelledObject, covered_share, lower_bound, read_labels, recall_figures
 
+SETTINGS = {
+    "covered_share": 0.99,
+    "confidence": 0.95,
+    "min_height_px": {"face": 0, "plate": 0},
+    "size_bins_px": [],
+}
 IMAGE = ("camera_left", 100)
 HEADER = "camera,t_ns,kind,x_min,y_min,x_max,y_max\n"
 
@@ -53,8 +59,7 @@ def test_figures_keep_faces_and_plates_apart():
             labels,
             {IMAGE: [(0, 0, 10, 10)]},
             {IMAGE: (60, 80)},
-            covered_share_wanted=0.99,
-            confidence=0.95,
+            settings=SETTINGS,
             where="labels",
         )
     }
@@ -64,15 +69,31 @@ def test_figures_keep_faces_and_plates_apart():
 
 
 def test_without_labels_recall_is_unknown():
-    figures = recall_figures([], {}, {}, covered_share_wanted=0.99, confidence=0.95, where="labels")
-    assert [figure.value for figure in figures] == [None] * 4
+    figures = recall_figures([], {}, {}, settings=SETTINGS, where="labels")
+    assert {"recall_face_pct_low", "recall_plate_pct_low"} <= {figure.name for figure in figures}
+    assert all(figure.value is None for figure in figures)
+
+
+def test_recall_is_divided_by_height_and_the_gate_counts_from_a_height_on():
+    labels = [labelled("face", 0, 0, 9, height) for height in (5, 14, 20, 21)]
+    found = recall_figures(
+        labels,
+        {IMAGE: [(0, 0, 10, 21)]},
+        {IMAGE: (60, 80)},
+        settings=SETTINGS | {"min_height_px": {"face": 10, "plate": 10}, "size_bins_px": [8, 20]},
+        where="labels",
+    )
+    values = {figure.name: figure.value for figure in found}
+    assert values["recall_face_pct"] == pytest.approx(200 / 3)
+    assert values["recall_face_pct_0_10px"] == 100
+    assert values["recall_face_pct_10_20px"] == 100
+    assert values["recall_face_pct_20px"] == 50
+    assert "recall_face_pct_8_20px" not in values
 
 
 def test_label_of_an_unlisted_image_is_an_error():
     with pytest.raises(CardError, match="not in the frames"):
-        recall_figures(
-            [labelled("face", 0, 0, 1, 1)], {}, {}, covered_share_wanted=0.99, confidence=0.95, where="labels"
-        )
+        recall_figures([labelled("face", 0, 0, 1, 1)], {}, {}, settings=SETTINGS, where="labels")
 
 
 def test_reads_what_a_person_labelled(tmp_path):

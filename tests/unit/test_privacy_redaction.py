@@ -35,7 +35,7 @@ def jpeg(layout: str, height: int, width: int, seed: int = 0) -> bytes:
 
 
 def box(x_min: float, y_min: float, x_max: float, y_max: float) -> Detection:
-    return Detection("face", x_min, y_min, x_max, y_max, score=1.0, source="test")
+    return Detection("face", x_min, y_min, x_max, y_max, score=1.0, source="test", model_sha256="")
 
 
 def coefficients(content: bytes, path) -> tuple[list[np.ndarray], np.ndarray, jpeglib.DCTJPEG]:

@@ -1,11 +1,41 @@
-# Needs: the raw images of both cameras and, for the recall gate, what a person labelled in some of them.
-# Makes: results/{id}/anonymized/ and results/{id}/regions/, the only places later rules take images from.
+# Needs: the raw images of both cameras, what a person labelled and reviewed; poses and sweeps to carry boxes on.
+# Makes: results/{id}/anonymized/ and regions/, the only places later rules take images from; a page to audit it.
+
+
+rule detect:
+    input:
+        inventory=rules.ingest.output.inventory,
+        frames=rules.ingest.output.frames,
+    output:
+        images="results/{id}/detections/searched_images.parquet",
+        detections="results/{id}/detections/detections.parquet",
+        report="results/{id}/detection.report.json",
+    log:
+        "logs/{id}/detect.log",
+    priority: 1
+    params:
+        cfg=cfg(
+            "privacy",
+            "embedded",
+            "models",
+            "tile_px",
+            "tile_overlap_px",
+            "face",
+            "plate",
+        ),
+        code=code("detect"),
+        recording=recording_folder,
+        out=subpath(output.images, parent=True),
+    script:
+        "../scripts/detect.py"
 
 
 rule privacy:
     input:
+        unpack(privacy_sight),
         inventory=rules.ingest.output.inventory,
         frames=rules.ingest.output.frames,
+        detections=rules.detect.output.detections,
     output:
         images="results/{id}/anonymized/images.parquet",
         redactions="results/{id}/anonymized/redactions.parquet",
@@ -16,9 +46,9 @@ rule privacy:
     params:
         cfg=privacy_cfg,
         code=code("privacy"),
-        raw=raw_fingerprint(raw_folder, "privacy_labels.csv"),
+        raw=raw_fingerprint(raw_folder, "privacy_labels.csv", "privacy_review.csv"),
         recording=recording_folder,
-        labelled=lambda wildcards: f"{raw_folder(wildcards)}/privacy_labels.csv",
+        reviewed=raw_folder,
         out=subpath(output.images, parent=True),
     script:
         "../scripts/privacy.py"
@@ -40,3 +70,22 @@ rule regions:
         out=subpath(output.inventory, parent=True),
     script:
         "../scripts/regions.py"
+
+
+rule privacy_audit:
+    input:
+        inventory=rules.privacy.output.inventory,
+        privacy_report=rules.privacy.output.report,
+        labels=rules.annotations.output.labels,
+    output:
+        page="results/{id}/privacy_audit/index.html",
+        touched="results/{id}/privacy_audit/redacted_irregularities.parquet",
+    log:
+        "logs/{id}/privacy_audit.log",
+    params:
+        cfg=cfg("privacy", "audit"),
+        code=code("privacy_audit"),
+        anonymized=subpath(input.inventory, parent=True),
+        out=subpath(output.page, parent=True),
+    script:
+        "../scripts/privacy_audit.py"

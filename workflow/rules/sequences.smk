@@ -145,6 +145,18 @@ def privacy_cfg(wildcards):
     return {**chosen, "settings": {**chosen["settings"], "overrides": signed}}
 
 
+def privacy_sight(wildcards):
+    """What carries boxes from image to image, where the sequence has it."""
+    sequence = SEQUENCES[wildcards.id]
+    if not (has_poses(sequence) and has(sequence, "lidar_front")):
+        return {}
+    return {
+        "calibration": rules.calibration.output.calibration,
+        "trajectory": rules.poses.output.trajectory,
+        "bursts": rules.ingest.output.bursts,
+    }
+
+
 def session_bundle(wildcards):
     return f"{RAW}/sessions/{SEQUENCES[wildcards.id].session}/calibration.json"
 
@@ -163,6 +175,7 @@ def stages_of(sequence):
         "wheels": has_map(sequence),
         "privacy": has_camera(sequence),
         "annotations": has(sequence, "camera_left"),
+        "privacy_audit": has(sequence, "camera_left"),
         "irregularities": has_map(sequence),
         "splits": has(sequence, "camera_left"),
     }
@@ -174,7 +187,7 @@ def package_inputs(wildcards):
     stages = [
         stage
         for stage in stages_of(SEQUENCES[wildcards.id])
-        if stage not in ("splits", "irregularities")
+        if stage not in ("splits", "irregularities", "privacy_audit")
     ]
     found = {f"{stage}_report": getattr(rules, stage).output.report for stage in stages}
     for name, (stage, output) in PACKED.items():

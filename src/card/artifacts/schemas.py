@@ -72,15 +72,22 @@ def default_settings(stage: str) -> dict[str, Any]:
 
 
 def with_defaults(document: Mapping[str, Any], schema: Mapping[str, Any]) -> dict[str, Any]:
-    """A document with the defaults of its schema filled in, objects within objects included."""
+    """A document with the defaults of its schema filled in, objects within objects and arrays included."""
     filled = dict(document)
     for name, field in schema.get("properties", {}).items():
+        if isinstance(field, bool):  # a schema that permits anything, or nothing
+            continue
         if "$ref" in field:
             field = load_schema(field["$ref"].removesuffix(".schema.json").removeprefix("card:"))
         if "properties" in field and isinstance(filled.get(name, {}), Mapping):
             filled[name] = with_defaults(filled.get(name, {}), field)
         elif name not in filled and "default" in field:
             filled[name] = copy.deepcopy(field["default"])
+        items = field.get("items", {})
+        if isinstance(items, Mapping) and "properties" in items and isinstance(filled.get(name), list):
+            filled[name] = [
+                with_defaults(item, items) if isinstance(item, Mapping) else item for item in filled[name]
+            ]
     return filled
 
 

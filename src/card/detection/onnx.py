@@ -131,6 +131,14 @@ class OnnxDetector:
             raise CardError("model takes another size", where=self._model, found=shape[2:], wanted=size)
 
 
+def providers() -> list[str]:
+    """A GPU's execution provider where the installed runtime has one, then the CPU's."""
+    import onnxruntime
+
+    there = onnxruntime.get_available_providers()
+    return [name for name in ("CUDAExecutionProvider", "CPUExecutionProvider") if name in there]
+
+
 def _session(model: Path, sha256: str, threads: int) -> Any:
     import onnxruntime
 
@@ -143,7 +151,7 @@ def _session(model: Path, sha256: str, threads: int) -> Any:
     options.inter_op_num_threads = 1
     options.log_severity_level = 4  # errors are raised
     try:
-        return onnxruntime.InferenceSession(str(model), options, providers=["CPUExecutionProvider"])
+        return onnxruntime.InferenceSession(str(model), options, providers=providers())
     except Exception as error:
         raise CardError("model is no ONNX", where=model, found=_first_line(error)) from error
 

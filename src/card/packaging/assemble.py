@@ -34,6 +34,7 @@ SHIPPED_SCHEMAS = (
     "poses",
     "provenance",
     "quality",
+    "redactions",
     "release",
     "release_files",
     "release_frames",

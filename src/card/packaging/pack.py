@@ -25,6 +25,7 @@ from card.packaging.entries import gather_entries
 from card.packaging.frame_rows import frame_columns
 from card.packaging.modalities import Entry, recorded_hash
 from card.packaging.quality import gather_quality
+from card.packaging.redactions import redactions_of_kept
 from card.packaging.sequence_row import sequence_document
 from card.packaging.shards import write_shards
 from card.packaging.takedowns import Takedown, gone, tombstones
@@ -145,6 +146,9 @@ def pack_sequence(
             if path is not None:
                 (read_json if path.suffix == ".json" else read_table)(path, schema)
                 shutil.copyfile(path, folder / "sidecars" / name)
+        if anonymized:
+            redactions = redactions_of_kept(anonymized / "redactions.parquet", taken)
+            write_table(folder / "sidecars" / "redactions.parquet", redactions, "redactions")
         write_json(folder / "sidecars" / "quality.json", quality, "quality")
         provenance = {
             "schema": "provenance",

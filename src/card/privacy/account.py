@@ -1,4 +1,4 @@
-"""What was done to each image, and how well: the tables and the report of the privacy stage."""
+"""What was done to each image, and how well: table ``images`` and the report of the privacy stage."""
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
@@ -7,28 +7,20 @@ from pathlib import Path
 from typing import Any
 
 from card.artifacts import Figure, write_report
-from card.privacy.detection import Detection, Detector
+from card.privacy.detection import Detection
+from card.privacy.jobs import Job
 from card.privacy.recall import LabelledObject, recall_figures
 from card.privacy.redaction import Area
 
 
 @dataclass(frozen=True)
-class Job:
-    """One image to redact: where it is and where its redacted copy goes."""
-
-    camera: str
-    t_ns: int
-    source: Path
-    target: Path
-
-
-@dataclass(frozen=True)
 class Outcome:
-    """What happened to one image: size in pixels, boxes and the areas filled for them, hashes out and in."""
+    """One image: its file, size in pixels, boxes and the areas filled for them, hashes out and in."""
 
+    file: str
     width: int
     height: int
-    detections: list[Detection]
+    boxes: list[Detection]
     areas: list[Area]
     redacted_pixels: int
     sha256: str
@@ -36,35 +28,21 @@ class Outcome:
 
 
 def image_columns(
-    jobs: Sequence[Job], outcomes: Sequence[Outcome], folder: Path, detector: Detector
+    jobs: Sequence[Job], outcomes: Sequence[Outcome], detectors: Sequence[str]
 ) -> dict[str, list[Any]]:
     """Columns of table ``images``."""
     return {
         "camera": [job.camera for job in jobs],
         "t_ns": [job.t_ns for job in jobs],
-        "file": [job.target.relative_to(folder).as_posix() for job in jobs],
+        "file": [outcome.file for outcome in outcomes],
         "width": [outcome.width for outcome in outcomes],
         "height": [outcome.height for outcome in outcomes],
         "redactions": [len(outcome.areas) for outcome in outcomes],
         "redacted_pixels": [outcome.redacted_pixels for outcome in outcomes],
         "sha256": [outcome.sha256 for outcome in outcomes],
         "source_sha256": [outcome.source_sha256 for outcome in outcomes],
-        "detector": [detector.name] * len(jobs),
-        "detector_version": [detector.version] * len(jobs),
+        "detectors": [", ".join(detectors)] * len(jobs),
     }
-
-
-def redaction_columns(
-    jobs: Sequence[Job], outcomes: Sequence[Outcome], detector: Detector
-) -> dict[str, list[Any]]:
-    """Columns of table ``redactions``."""
-    rows = [
-        (job.camera, job.t_ns, box.kind, *area, box.score, box.source, detector.models[box.source])
-        for job, outcome in zip(jobs, outcomes, strict=True)
-        for box, area in zip(outcome.detections, outcome.areas, strict=True)
-    ]
-    names = ("camera", "t_ns", "kind", "x_min", "y_min", "x_max", "y_max", "score", "source", "model_sha256")
-    return {name: [row[index] for row in rows] for index, name in enumerate(names)}
 
 
 def write_account(
@@ -77,6 +55,7 @@ def write_account(
     gates: Sequence[Mapping[str, Any]],
     jobs: Sequence[Job],
     outcomes: Sequence[Outcome],
+    notes: Sequence[str],
 ) -> None:
     """Write the stage's report, with recall where there are ``labels``."""
     areas: dict[tuple[str, int], list[Area]] = defaultdict(list)
@@ -88,13 +67,13 @@ def write_account(
         labels,
         areas,
         sizes,
-        covered_share_wanted=settings["covered_share"],
-        confidence=settings["confidence"],
+        settings=settings["recall"],
         where=inputs.get("privacy_labels"),
     )
     pixels = sum(outcome.width * outcome.height for outcome in outcomes)
     share = 100 * sum(outcome.redacted_pixels for outcome in outcomes) / pixels
-    kinds = [box.kind for outcome in outcomes for box in outcome.detections]
+    boxes = [box for outcome in outcomes for box in outcome.boxes]
+    kinds, sources = [box.kind for box in boxes], [box.source for box in boxes]
     write_report(
         report,
         stage="privacy",
@@ -105,6 +84,9 @@ def write_account(
             "images": len(jobs),
             "faces_redacted": kinds.count("face"),
             "plates_redacted": kinds.count("plate"),
+            "from_neighbours": sources.count("neighbour"),
+            "from_partner": sources.count("partner"),
+            "from_review": sources.count("review"),
             "faces_labelled": sum(labelled.kind == "face" for labelled in labels),
             "plates_labelled": sum(labelled.kind == "plate" for labelled in labels),
         },
@@ -114,5 +96,5 @@ def write_account(
         ],
         gates=gates,
         overrides=[override for override in settings["overrides"] if sequence in override["sequences"]],
-        notes=[] if labels else ["No labelled faces or plates: recall is unknown."],
+        notes=[*notes, *([] if labels else ["No labelled faces or plates: recall is unknown."])],
     )

@@ -3,17 +3,19 @@
 import csv
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from card.artifacts import Figure
 from card.errors import CardError
 from card.privacy.redaction import Area
+from card.privacy.tables import Image
 
 COLUMNS = ["camera", "t_ns", "kind", "x_min", "y_min", "x_max", "y_max"]
-Image = tuple[str, int]  # camera, t_ns
 
 
 class LabelledObject(NamedTuple):
@@ -91,39 +93,61 @@ def recall_figures(
     areas: Mapping[Image, Sequence[Area]],
     sizes: Mapping[Image, tuple[int, int]],
     *,
-    covered_share_wanted: float,
-    confidence: float,
+    settings: Mapping[str, Any],
     where: object,
 ) -> list[Figure]:
-    """Share of labelled objects that are redacted, in percent, by kind, each with its lower bound.
+    """Share of labelled objects that are redacted, in percent, by kind and by height, with lower bounds.
 
-    ``areas`` and ``sizes`` (width, height) are by image; a kind without labels has no value, and so fails
-    its gate.
+    Parameters
+    ----------
+    areas, sizes : redacted areas and (width, height) by image.
+    settings : ``recall`` of ``settings/privacy``.
+
+    A kind without labels of the height that counts has no value, and so fails its gate.
     """
     figures = []
     for kind in ("face", "plate"):
-        shares = []
+        heights, covered = [], []
         for labelled in labels:
             if labelled.kind != kind:
                 continue
             if labelled.image not in sizes:
                 raise CardError("labelled image is not in the frames", where=where, found=labelled.image)
-            shares.append(
-                covered_share(labelled, areas.get(labelled.image, ()), sizes[labelled.image], where)
-            )
-        hits, total = sum(share >= covered_share_wanted for share in shares), len(shares)
-        wanted = f"at least {covered_share_wanted:.0%} of their pixels redacted"
-        recall = 100 * hits / total if total else None
-        low = 100 * lower_bound(hits, total, confidence) if total else None
-        figures += [
-            Figure(
-                f"recall_{kind}_pct", recall, "%", f"Share of the {total} labelled {kind}s with {wanted}."
-            ),
-            Figure(
-                f"recall_{kind}_pct_low",
-                low,
-                "%",
-                f"Exact one-sided {confidence:.0%} lower bound of the share.",
-            ),
-        ]
+            share = covered_share(labelled, areas.get(labelled.image, ()), sizes[labelled.image], where)
+            heights.append(labelled.y_max - labelled.y_min)
+            covered.append(share >= settings["covered_share"])
+        floor = settings["min_height_px"][kind]
+        figures += _figures(kind, "", np.array(heights), np.array(covered), (floor, np.inf), settings)
+        edges = [0.0, floor, *(edge for edge in settings["size_bins_px"] if edge > floor), np.inf]
+        for low, high in pairwise(edges):
+            name = f"_{low:g}_{high:g}px" if np.isfinite(high) else f"_{low:g}px"
+            figures += _figures(kind, name, np.array(heights), np.array(covered), (low, high), settings)
     return figures
+
+
+def _figures(
+    kind: str,
+    suffix: str,
+    heights: NDArray[np.float64],
+    covered: NDArray[np.bool_],
+    within: tuple[float, float],
+    settings: Mapping[str, Any],
+) -> list[Figure]:
+    chosen = covered[(heights >= within[0]) & (heights < within[1])] if len(heights) else covered
+    hits, total = int(chosen.sum()), len(chosen)
+    share, confidence = settings["covered_share"], settings["confidence"]
+    which = f"{total} labelled {kind}s from {within[0]:g} to below {within[1]:g} px in height"
+    return [
+        Figure(
+            f"recall_{kind}_pct{suffix}",
+            100 * hits / total if total else None,
+            "%",
+            f"Share of the {which} with at least {share:.0%} of their pixels redacted.",
+        ),
+        Figure(
+            f"recall_{kind}_pct_low{suffix}",
+            100 * lower_bound(hits, total, confidence) if total else None,
+            "%",
+            f"Exact one-sided {confidence:.0%} lower bound of the share of the {which}.",
+        ),
+    ]

@@ -46,6 +46,7 @@ def fill_regions(
                     y_max=region["y_max"] - 0.5,
                     score=1.0,
                     source="takedown",
+                    model_sha256="",
                 )
                 boxes.setdefault((region["camera"], t_ns), []).append(box)
     images = {

@@ -18,6 +18,7 @@ SIDECARS = {
     "wheel_excitation.json": "wheel_excitation",
     "road_planes.parquet": "road_planes",
     "imu.parquet": "imu",
+    "redactions.parquet": "redactions",
 }
 ALWAYS = ("provenance.json", "quality.json")
 

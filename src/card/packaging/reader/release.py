@@ -108,6 +108,15 @@ class Release:
         with Image.open(io.BytesIO(self.read(sequence, frame, camera))) as image:
             return np.asarray(image.convert("RGB"))
 
+    def redaction_mask(self, sequence: str, frame: int, camera: str = "camera_left") -> Any:
+        """Where an image was filled with a constant: (H, W) bool, of the distorted image."""
+        model = self.calibration(sequence)["cameras"][camera]
+        mask = np.zeros((model["height"], model["width"]), dtype=bool)
+        for row in self._table(f"sequences/{sequence}/redactions.parquet", "redactions").to_pylist():
+            if (row["frame"], row["camera"]) == (frame, camera):
+                mask[row["y_min"] : row["y_max"], row["x_min"] : row["x_max"]] = True
+        return mask
+
     def points(self, sequence: str, frame: int) -> Any:
         """Ground truth of a frame: (N, 3) float32 in `camera_left`, m."""
         with np.load(io.BytesIO(self.read(sequence, frame, "ground_truth")), allow_pickle=False) as archive:

@@ -1,0 +1,41 @@
+"""Runs a packaged network on one image, tile by tile."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from card.detection.views import View, tiles
+from card.errors import CardError
+
+
+def session_of(model: bytes, name: str) -> Any:
+    """An onnxruntime session on the best provider there is, one thread: images share the cores already."""
+    import onnxruntime
+
+    from card.detection.onnx import providers
+
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = options.inter_op_num_threads = 1
+    options.log_severity_level = 4  # errors are raised
+    try:
+        return onnxruntime.InferenceSession(model, options, providers=providers())
+    except Exception as error:
+        raise CardError("model is no ONNX", where=name, found=str(error).splitlines()[0]) from error
+
+
+def enlarged_tiles(
+    image: NDArray[np.uint8], enlargement: float, size_px: int, overlap_px: int
+) -> Iterator[View]:
+    """Tiles of an image (H, W, 3) enlarged by a factor; their `to_image` leads back to the enlarged image."""
+    import cv2
+
+    if not image.size:
+        return
+    if enlargement > 1:
+        larger = cv2.resize(image, None, fx=enlargement, fy=enlargement, interpolation=cv2.INTER_CUBIC)
+        image = np.asarray(larger, dtype=np.uint8)
+    # A small image needs no tile of full size, only whole strides of the network.
+    size = min(size_px, -(-max(image.shape[:2]) // 32) * 32)
+    yield from tiles(image, size, min(overlap_px, size // 2))
