@@ -12,8 +12,8 @@ from skimage import data
 from card.artifacts import default_settings, read_table, write_table
 from card.errors import CardError
 from card.privacy.anonymize import anonymize
-from card.privacy.detect import detect
 from card.privacy.redaction import FILL
+from card.privacy.search import search
 
 GATE = {"figure": "recall_face_pct", "unit": "%", "better": "higher", "threshold": 99.0}
 PLATE_GATE = GATE | {"figure": "recall_plate_pct"}
@@ -52,11 +52,11 @@ def run(recording: Path, results: str = "town", threads: int = 1, gates=(), **se
     root = recording.parents[1]
     out = root / "results" / results / "anonymized"
     chosen = default_settings("privacy") | settings
-    search(recording, out.parent, threads, chosen)
+    search_images(recording, out.parent, threads, chosen)
     anonymize(
         recording=recording,
         frames=root / "frames.parquet",
-        detections=out.parent / "detections",
+        detections=out.parent / "privacy_search",
         sight={},
         labelled=recording / "privacy_labels.csv",
         reviews=recording / "privacy_review.csv",
@@ -69,12 +69,12 @@ def run(recording: Path, results: str = "town", threads: int = 1, gates=(), **se
     return out
 
 
-def search(recording: Path, results: Path, threads: int, settings: dict) -> None:
-    detect(
+def search_images(recording: Path, results: Path, threads: int, settings: dict) -> None:
+    search(
         recording=recording,
         frames=recording.parents[1] / "frames.parquet",
-        out=results / "detections",
-        report=results / "detection.report.json",
+        out=results / "privacy_search",
+        report=results / "privacy_search.report.json",
         settings=settings,
         threads=threads,
     )
@@ -211,7 +211,7 @@ def test_an_image_that_changed_after_the_search_is_refused(drive):
         anonymize(
             recording=drive,
             frames=drive.parents[1] / "frames.parquet",
-            detections=out.parent / "detections",
+            detections=out.parent / "privacy_search",
             sight={},
             labelled=drive / "privacy_labels.csv",
             reviews=drive / "privacy_review.csv",

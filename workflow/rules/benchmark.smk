@@ -64,7 +64,7 @@ rule compare_methods:
         comparison="results/benchmark/{repository}/comparison.json",
         table="results/benchmark/{repository}/table.md",
         tex="results/benchmark/{repository}/table.tex",
-        figures=directory("results/benchmark/{repository}/figures"),
+        figure="results/benchmark/{repository}/figures/distance.png",
         report="results/benchmark/{repository}.report.json",
     log:
         "logs/benchmark/{repository}.log",
@@ -75,6 +75,7 @@ rule compare_methods:
         code=code("compare_methods"),
         methods=compared_methods,
         tree=subpath(input.sums, parent=True),
+        figures=subpath(output.figure, parent=True),
     script:
         "../scripts/compare_methods.py"
 

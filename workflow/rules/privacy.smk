@@ -2,16 +2,16 @@
 # Makes: results/{id}/anonymized/ and regions/, the only places later rules take images from; a page to audit it.
 
 
-rule detect:
+rule privacy_search:
     input:
         inventory=rules.ingest.output.inventory,
         frames=rules.ingest.output.frames,
     output:
-        images="results/{id}/detections/searched_images.parquet",
-        detections="results/{id}/detections/detections.parquet",
-        report="results/{id}/detection.report.json",
+        images="results/{id}/privacy_search/searched_images.parquet",
+        detections="results/{id}/privacy_search/detections.parquet",
+        report="results/{id}/privacy_search.report.json",
     log:
-        "logs/{id}/detect.log",
+        "logs/{id}/privacy_search.log",
     priority: 1
     params:
         cfg=cfg(
@@ -23,11 +23,11 @@ rule detect:
             "face",
             "plate",
         ),
-        code=code("detect"),
+        code=code("privacy_search"),
         recording=recording_folder,
         out=subpath(output.images, parent=True),
     script:
-        "../scripts/detect.py"
+        "../scripts/privacy_search.py"
 
 
 rule privacy:
@@ -35,7 +35,7 @@ rule privacy:
         unpack(privacy_sight),
         inventory=rules.ingest.output.inventory,
         frames=rules.ingest.output.frames,
-        detections=rules.detect.output.detections,
+        detections=rules.privacy_search.output.detections,
     output:
         images="results/{id}/anonymized/images.parquet",
         redactions="results/{id}/anonymized/redactions.parquet",

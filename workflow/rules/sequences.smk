@@ -300,3 +300,42 @@ def evaluations(wildcards):
             "card: no predictions to evaluate: name them in config.yaml under benchmark.methods"
         )
     return tables
+
+
+def detectors():
+    """By the split it was trained on, each detector that the configuration names."""
+    named = SETTINGS["proposals"]["detectors"]
+    return {way: detector for way, detector in named.items() if detector["model"]}
+
+
+def sampled():
+    """Rows of the sample of the sequences to build; it is drawn by `card annotations sample`."""
+    path = Path(SETTINGS["proposals"]["sample"])
+    if not path.is_file():
+        raise WorkflowError(
+            f"card: no sample: draw it into {path} with `card annotations sample`"
+        )
+    return [row for row in read_sample(path) if row.sequence in SEQUENCES]
+
+
+def sample_rows(wildcards):
+    return [asdict(row) for row in sampled() if row.sequence == wildcards.id]
+
+
+def sampled_outputs(rule, way):
+    """Outputs of a rule, for one detector, of all sequences that have sampled frames."""
+    names = sorted({row.sequence for row in sampled()})
+    return expand(list(rule.output), id=names, way=way)
+
+
+def proposals_of_all(wildcards):
+    """Proposals and their review for each detector, and its figures where it can be judged."""
+    if not detectors():
+        raise WorkflowError(
+            "card: no detector: name one in config.yaml under proposals.detectors"
+        )
+    return [
+        path
+        for way in detectors()
+        for path in sampled_outputs(rules.proposal_review, way)
+    ]

@@ -18,5 +18,5 @@ with logged(Path(snakemake.log[0])):
         split=next(iter(given.values()))["split"],
         methods=methods,
         evaluations=evaluations,
-        out=Path(output.figures),
+        out=Path(snakemake.params.figures),
     )

@@ -25,7 +25,7 @@ class Searched:
     detections: list[Detection]
 
 
-def detect(
+def search(
     *,
     recording: Path,
     frames: Path,
@@ -40,7 +40,7 @@ def detect(
     ----------
     recording : folder with ``camera_left|right/<t_ns>.jpg``.
     frames : table ``frames`` of the sequence.
-    out : folder ``results/<id>/detections``, written whole or not at all.
+    out : folder ``results/<id>/privacy_search``, written whole or not at all.
     settings : the detectors' part of ``settings/privacy``.
     threads : worker processes; the bytes do not depend on it.
 
@@ -59,7 +59,7 @@ def detect(
                 start=_start_worker,
                 arguments=[settings],
                 threads=threads,
-                label=f"detect {out.parent.name}",
+                label=f"search {out.parent.name}",
             )
         )
         images = {
@@ -76,7 +76,7 @@ def detect(
     kinds = [box.kind for _, box in rows]
     write_report(
         report,
-        stage="detection",
+        stage="privacy_search",
         sequence=out.parent.name,
         settings=settings,
         inputs={"frames": frames},

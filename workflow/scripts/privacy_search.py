@@ -3,10 +3,10 @@
 from pathlib import Path
 
 from card.artifacts import logged
-from card.privacy.detect import detect
+from card.privacy.search import search
 
 with logged(Path(snakemake.log[0])):
-    detect(
+    search(
         recording=Path(snakemake.params.recording),
         frames=Path(snakemake.input.frames),
         out=Path(snakemake.params.out),
