@@ -240,6 +240,12 @@ def test_a_takedown_of_an_unknown_sequence_stops_the_run(built: Project) -> None
     assert "takedown of an unknown sequence (found de_nowhere" in result.stdout
 
 
+def test_part_of_a_release_is_not_uploaded(built: Project) -> None:
+    result = built.run("upload", "--config", f"sequences={TOWN}", "send=true")
+    assert result.returncode != 0
+    assert "part of a release cannot be uploaded" in result.stdout
+
+
 def test_an_upload_is_only_planned_and_placeholders_are_refused(built: Project) -> None:
     result = built.run("upload")
     assert result.returncode != 0

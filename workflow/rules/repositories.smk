@@ -99,3 +99,12 @@ def validations():
 def tree_sums(wildcards):
     repositories = [name for name in REPOSITORIES if in_tree(name) or not SUBSET]
     return expand(rules.assemble.output.sums, repository=repositories)
+
+
+def uploads(wildcards):
+    """Validations of all trees; part of a release must not take the place of the whole one on the Hub."""
+    if SUBSET:
+        raise WorkflowError(
+            "card: part of a release cannot be uploaded; leave out --config sequences"
+        )
+    return validations()

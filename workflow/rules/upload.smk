@@ -5,13 +5,14 @@
 rule upload:
     # What is on the Hub is no result of this machine: the rule makes no file and runs whenever it is asked for.
     input:
-        trees=validations(),
+        trees=uploads,
         firewall=rules.firewall.output,
     log:
         "logs/upload.log",
     params:
         cfg=cfg("packaging"),
         records=SETTINGS["records"],
-        really=SETTINGS["send"],
+        # On the command line it is text.
+        really=str(SETTINGS["send"]).lower() == "true",
     script:
         "../scripts/upload.py"
