@@ -61,7 +61,7 @@ def test_the_card_tells_what_the_splits_are_worth(tmp_path: Path, mode: str, say
         stage="split_report",
         settings={"mode": mode},
         inputs={},
-        counts={"test_unknown": 2},
+        counts={"test_measured": 9, "test_apart": 0, "test_unknown": 2},
         figures=[Figure("leak_m_p5", 41.6, "m", "x"), Figure("stratum_deviation", 0.0312, "1", "x")],
     )
     item = {"id": "de_test", "package": inputs["out"], "splits": splits}

@@ -37,6 +37,9 @@ def split_figures(report: Mapping[str, Any] | None) -> str:
     unknown = (
         f" {counts['test_unknown']} test frames have training frames of their place without a common map."
     )
+    tested = sum(counts[f"test_{state}"] for state in ("measured", "apart", "unknown"))
+    if not tested:
+        return f"{MODES[mode]}There are no test frames here."
     near = (
         f"95 % of the test frames lie {value['leak_m_p5']:.0f} m or more from the nearest training frame."
         if value["leak_m_p5"] is not None
