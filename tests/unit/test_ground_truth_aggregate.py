@@ -257,3 +257,24 @@ def test_a_missing_lidar_flags_the_frames(drive, tmp_path, lidar, flag):
     # Without the rear LiDAR nothing is static: what is left is the visible part of the keyframe.
     assert all((row["points_saved"] > 0) == (flag == "no_rear") for row in rows)
     assert all(row["points_saved"] <= row["points_keyframe"] for row in rows)
+
+
+def test_the_consensus_rejects_and_says_how_many(run, drive, default):
+    folder, _ = drive
+    maps = folder / "maps" / "scene"
+    maps.mkdir(parents=True, exist_ok=True)
+    for frame in range(len(FRAMES)):
+        # A depth of which the wall is far too near, and the road somewhere between.
+        np.save(maps / f"{frame:06d}.npy", np.full((160, 200), 5.0, np.float32))
+    consensus = default_settings("ground_truth")["consensus"] | {"sequences": ["scene"]}
+    _, report = run(consensus=consensus | {"depth_maps": str(maps.parent)})
+    before = default[1]["counts"]
+    rejected = report["counts"]["points_rejected"]
+    assert 0 < rejected < before["points_saved"]
+    assert before["points_saved"] - rejected <= report["counts"]["points_saved"] < before["points_saved"]
+    assert report["counts"]["points_pass_2"] == before["points_pass_2"]
+    assert f"{rejected} points inconsistent with the monocular depth" in report["notes"]
+    with pytest.raises(CardError, match="consensus without a depth"):
+        run(consensus=consensus)
+    with pytest.raises(CardError, match="consensus without anonymized images"):
+        run(consensus=consensus | {"model": "m.onnx"})

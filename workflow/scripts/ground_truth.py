@@ -18,4 +18,5 @@ with logged(Path(snakemake.log[0])):
         settings=snakemake.params.cfg["settings"],
         gates=snakemake.params.cfg["gates"],
         threads=snakemake.threads,
+        anonymized=next((Path(path).parent for path in snakemake.input.anonymized), None),
     )

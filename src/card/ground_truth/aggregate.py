@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -23,10 +24,12 @@ from card.artifacts import (
 )
 from card.errors import CardError
 from card.geometry import Trajectory
+from card.ground_truth.consensus import Consensus, DepthSource, depth_maps
 from card.ground_truth.coverage import FrameWindow, frame_window
 from card.ground_truth.frame import build_frame
 from card.ground_truth.hpr.workspace import Workspace
 from card.ground_truth.left_camera import LeftCamera
+from card.ground_truth.monocular import OnnxDepth
 from card.ground_truth.static_set import StaticSet, static_voxels
 from card.ground_truth.static_window import StaticWindow
 from card.ground_truth.summary import write_summary
@@ -52,6 +55,7 @@ def aggregate(
     settings: Mapping[str, Any],
     gates: Sequence[Mapping[str, Any]],
     threads: int,
+    anonymized: Path | None = None,
 ) -> None:
     """Write the folder `out`: a cloud a frame, the static voxels, the coverage and an inventory.
 
@@ -61,6 +65,7 @@ def aggregate(
     calibration, ego_mask, trajectory : the session's calibration and mask, poses at IMU rate.
     settings : schema ``settings/ground_truth``, filled. gates : limits for figures of the report.
     threads : processes that work on frames; the bytes do not depend on it.
+    anonymized : folder of the anonymized images, for a monocular model (``consensus``).
 
     Raises
     ------
@@ -72,9 +77,10 @@ def aggregate(
     poses = Trajectory.from_table(read_table(trajectory, "trajectory"))
     drive = Drive(recording, bursts, document, poses, settings)
     tasks = _tasks(frames, drive)
+    consensus = _consensus(drive.id, camera, anonymized, settings)
     static = static_voxels(drive, settings)
     with atomic_folder(out) as folder:
-        work = _Work(drive, static, camera, settings, folder)
+        work = _Work(drive, static, camera, settings, folder, consensus)
         rows = list(progress(_rows(work, tasks, threads), "frames", total=len(tasks)))
         _write_static(folder / "static_voxels.npz", static)
         columns = {name: [row[name] for row in rows] for name in load_schema("coverage")["columns"]}
@@ -104,6 +110,7 @@ class _Work:
     camera: LeftCamera
     settings: Mapping[str, Any]
     folder: Path
+    consensus: Consensus | None
 
     def rows(self, tasks: Sequence[_Task]) -> Iterator[dict[str, Any]]:
         """Write the clouds of consecutive frames; yield their rows of schema ``coverage``."""
@@ -125,10 +132,37 @@ class _Work:
         world_from_rig = self.drive.trajectory.at(task.t_ns)
         selection = window.select(selected.bursts, task.keyframe, world_from_rig)
         keyframe = self.drive.sweep(task.keyframe).points if task.keyframe >= 0 else np.empty((0, 3))
-        frame = build_frame(selection, keyframe, world_from_rig, self.camera, self.settings, workspace)
+        consistent = (
+            None if self.consensus is None else partial(self.consensus.consistent, task.frame, task.t_ns)
+        )
+        frame = build_frame(
+            selection, keyframe, world_from_rig, self.camera, self.settings, workspace, consistent
+        )
         write_arrays(self.folder / f"{task.frame:06d}.npz", {"points": frame.points}, "ground_truth_points")
         share = frame.pixels / (self.camera.image.width * self.camera.image.height)
-        return {"frame": task.frame, **selected.columns, **frame.counts, "image_share": share}
+        row = {"frame": task.frame, **selected.columns, **frame.counts, "image_share": share}
+        return row | {"points_rejected": frame.rejected}
+
+
+def _consensus(
+    sequence: str, camera: LeftCamera, anonymized: Path | None, settings: Mapping[str, Any]
+) -> Consensus | None:
+    wanted = settings["consensus"]
+    if sequence not in wanted["sequences"]:
+        return None
+    if bool(wanted["depth_maps"]) == bool(wanted["model"]):
+        raise CardError(
+            "consensus without a depth",
+            where=f"ground_truth.consensus, {sequence}",
+            wanted="either depth_maps or model",
+        )
+    if wanted["depth_maps"]:
+        source: DepthSource = depth_maps(Path(wanted["depth_maps"]) / sequence, camera.undistorted)
+    elif anonymized is None:
+        raise CardError("consensus without anonymized images", where=sequence)
+    else:
+        source = OnnxDepth(anonymized, camera.image, camera.undistorted, wanted)
+    return Consensus(source, camera.undistorted, wanted)
 
 
 def _tasks(frames: Path, drive: Drive) -> list[_Task]:

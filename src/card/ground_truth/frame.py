@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -39,6 +39,7 @@ class Frame:
     points: npt.NDArray[np.float32]
     pixels: int
     counts: dict[str, int]
+    rejected: int
 
 
 def build_frame(
@@ -48,6 +49,8 @@ def build_frame(
     camera: LeftCamera,
     settings: Mapping[str, Any],
     workspace: Workspace,
+    consistent: Callable[[npt.NDArray[np.float64], npt.NDArray[np.float64]], npt.NDArray[np.bool_]]
+    | None = None,
 ) -> Frame:
     """Reduce the selected points and the keyframe to what the left camera sees.
 
@@ -55,6 +58,7 @@ def build_frame(
     ----------
     keyframe : (K, 3) world, metres: all points of the keyframe burst.
     world_from_rig : (4, 4) at the image's time.
+    consistent : which visible points (N, 3) stay beside the keyframe (K, 3); see `consensus`.
     """
     margin, nearest = settings["view_margin_rad"], settings["nearest_depth_m"]
     key = apply(inverse(world_from_rig @ camera.rig_from_camera), keyframe)
@@ -68,13 +72,19 @@ def build_frame(
 
     step = settings["resolution_m"]
     visible = np.rint(visible / step) * step
+    rejected = 0
+    if consistent is not None:
+        stays = consistent(visible, key)
+        rejected = int((~stays).sum())
+        visible = visible[stays]
     on_image, pixels = camera.raster(visible)
     counts = {
         **selection.counts,
         "points_pass_1": len(first),
         "points_keyframe": len(key),
-        "points_pass_2": len(visible),
+        "points_pass_2": len(visible) + rejected,
         "points_saved": len(on_image),
     }
     different = int(np.count_nonzero(np.diff(pixels, axis=0).any(axis=1))) + min(len(pixels), 1)
-    return Frame(visible[on_image].astype(np.float32), different, {name: counts[name] for name in STEPS})
+    ordered = {name: counts[name] for name in STEPS}
+    return Frame(visible[on_image].astype(np.float32), different, ordered, rejected)

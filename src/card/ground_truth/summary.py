@@ -42,6 +42,9 @@ def write_summary(
         for before, after in pairwise(STEPS)
         if after in _REASONS and totals[before] > totals[after]
     ]
+    rejected = sum(row["points_rejected"] for row in rows)
+    if rejected:
+        notes.append(f"{rejected} points inconsistent with the monocular depth")
     if not why["voxels_not_rigid"]:
         notes.append("the rigidity test rejected no voxel")
     notes += [f"{flags[flag]} frames flagged {flag}" for flag in sorted(flags) if flag != "complete"]
@@ -51,7 +54,7 @@ def write_summary(
         sequence=sequence,
         settings=settings,
         inputs=inputs,
-        counts={**why, "frames": len(rows), **totals},
+        counts={**why, "frames": len(rows), **totals, "points_rejected": rejected},
         figures=_figures(rows, flags),
         gates=gates,
         notes=notes,
