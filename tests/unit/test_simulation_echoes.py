@@ -1,11 +1,13 @@
 """Echoes against closed forms: steps, noise, dropouts, two returns; the errors of a unit found again."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from card.errors import CardError
 from card.geometry import Trajectory
 from card.geometry.corrections import correct_points
 from card.simulation.echoes import (
@@ -22,6 +24,7 @@ from card.simulation.lidar import Lidar, burst_starts
 from card.simulation.mesh import Mesh, box, join, mesh
 from card.simulation.raycast import Scene, Tracer
 from card.simulation.rig import CHANNELS, LIDARS, LidarCorrections, built_rig, nominal_rig
+from card.simulation.simulate import simulate_drive
 from card.simulation.surfaces import LOOKS, Surface
 from card.simulation.world import World, build_world
 
@@ -160,3 +163,10 @@ def test_corrections_put_every_channel_back_on_the_plane(standing: World) -> Non
     assert len(off) > 8
     assert np.abs(off).max() < 4 * 0.0051 / np.sqrt(800)
     assert np.abs(raw_off).max() > 5 * np.abs(off).max()
+
+
+def test_a_bag_of_dual_returns_is_refused(tmp_path: Path) -> None:
+    folders = {"recording": tmp_path / "r", "truth": tmp_path / "t"}
+    with pytest.raises(CardError, match="single returns"):
+        simulate_drive("de_gravel_offroad", **folders, scale="tiny", seed=1, dual_returns=True)
+    assert list(tmp_path.iterdir()) == []
