@@ -148,6 +148,7 @@ def assemble_tree(
     spdx: str = "CC-BY-4.0",
     terms: Any = None,
     takedowns: Any = (),
+    reviews: Any = {},  # noqa: B006
     previous: Path | None = None,
     version: str = "0.1.0",
     split_report: Path | None = None,
@@ -164,6 +165,7 @@ def assemble_tree(
         schemas=schema_folder(),
         split_report=split_report,
         takedowns=takedowns,
+        reviews=reviews,
         records=[previous] if previous else [],
         out=out,
         report=out.with_name(f"{out.name}.report.json"),

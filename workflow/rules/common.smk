@@ -12,6 +12,7 @@ from card.artifacts.schemas import check, load_schema, schema_folder, with_defau
 from card.errors import CardError
 from card.packaging.batches import batch_repository, read_batches
 from card.packaging.licenses import license_of, read_licenses
+from card.packaging.reviews import read_reviews
 from card.packaging.summary import summarize
 from card.packaging.takedowns import read_takedowns, whole_sequences
 from card.packaging.versions import latest_records
@@ -111,6 +112,9 @@ try:
     check_records()
     LICENSES, GATES, LEDGER, TAKEDOWNS, ROWS, SEQUENCES = load_plan()
     BATCHES = read_batches(Path(SETTINGS["batches_ledger"]))
+    REVIEWS = read_reviews(
+        Path(SETTINGS["ground_truth_reviews"]), {row.id for row in ROWS}, SEQUENCES
+    )
 except CardError as error:
     raise WorkflowError(f"card: {error}") from None
 

@@ -82,6 +82,7 @@ rule assemble:
             sequence.id for sequence in in_tree(wildcards.repository)
         ],
         takedowns=tree_takedowns,
+        reviews=tree_reviews,
         out=subpath(output.sums, parent=True),
     script:
         "../scripts/assemble.py"

@@ -21,6 +21,15 @@ def tree_takedowns(wildcards):
     return [entry for entry in TAKEDOWNS if entry["sequence"] in names]
 
 
+def tree_reviews(wildcards):
+    """Reviews of the ground truth of the sequences of a tree."""
+    return {
+        sequence.id: REVIEWS[sequence.id]
+        for sequence in in_tree(wildcards.repository)
+        if sequence.id in REVIEWS
+    }
+
+
 def earlier_releases(wildcards):
     """Files of the records of earlier releases of a repository; none for a subset, which is no release."""
     version = SETTINGS["packaging"]["release"]["version"]

@@ -22,6 +22,7 @@ with logged(Path(snakemake.log[0])):
         schemas=schema_folder(),
         split_report=Path(snakemake.input.split_report),
         takedowns=snakemake.params.takedowns,
+        reviews=snakemake.params.reviews,
         records=records,
         out=Path(snakemake.params.out),
         report=Path(snakemake.output.report),

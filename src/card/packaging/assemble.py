@@ -57,6 +57,7 @@ def assemble(
     schemas: Path,
     split_report: Path | None,
     takedowns: Sequence[Mapping[str, Any]],
+    reviews: Mapping[str, Mapping[str, Any]],
     records: Sequence[Path],
     out: Path,
     report: Path,
@@ -73,6 +74,7 @@ def assemble(
     split_report : report of the splits' leakage and balance, None without.
 
     takedowns : entries of `read_takedowns` about sequences of this tree.
+    reviews : of the ground truth, as of `read_reviews`, by sequence of this tree.
     records : records of earlier releases of this repository as of `latest_records`: the last, and that of
         this version if it was sent before. What is different from the last is stated in `changes.json`.
 
@@ -131,6 +133,7 @@ def assemble(
             quality=[
                 read_json(tree / "sequences" / item["id"] / "quality.json", "quality") for item in ordered
             ],
+            reviews=reviews,
             retracted=len(retracted),
             terms=terms,
             about=settings["release"],

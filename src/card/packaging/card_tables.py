@@ -85,8 +85,14 @@ def _sequence_cells(row: Row) -> tuple[Any, ...]:
     )
 
 
-def known_issues(release: Row, sequences: Sequence[Row], frames: Sequence[Row], retracted: int) -> str:
-    """What a user has to know: overrides, labels that nobody saw, incomplete ground truth."""
+def known_issues(
+    release: Row,
+    sequences: Sequence[Row],
+    frames: Sequence[Row],
+    reviews: Mapping[str, Row],
+    retracted: int,
+) -> str:
+    """What a user has to know: overrides, labels or ground truth that nobody saw, incomplete ground truth."""
     lines = [
         f"- `{item['sequence']}`: {item['stage']} failed its gate `{item['figure']}`; released because "
         f"{item['reason']} (signed by {item['signed_by']})."
@@ -97,6 +103,7 @@ def known_issues(release: Row, sequences: Sequence[Row], frames: Sequence[Row], 
             lines.append(
                 f"- `{row['sequence']}`: labels of {left} of {row['frames']} frames are not reviewed."
             )
+    lines += ground_truth_reviews(frames, reviews)
     flags = Counter(
         (row["sequence"], row["gt_flag"]) for row in frames if row["gt_flag"] not in (None, "complete")
     )
@@ -107,6 +114,19 @@ def known_issues(release: Row, sequences: Sequence[Row], frames: Sequence[Row], 
     if retracted:
         lines.append(f"- {retracted} files were retracted: `metadata/retractions.parquet`, `TAKEDOWN.md`.")
     return "\n".join(lines) or "None known."
+
+
+def ground_truth_reviews(frames: Sequence[Row], reviews: Mapping[str, Row]) -> list[str]:
+    """A line for each sequence whose ground truth is not signed off, or was accepted with a note."""
+    lines = []
+    for name in sorted({row["sequence"] for row in frames if row["gt_flag"] is not None}):
+        review = reviews.get(name)
+        if review is None:
+            lines.append(f"- `{name}`: nobody has signed off the ground truth after looking at it.")
+        elif review["note"] != "-":
+            signed = f"{review['reviewer']} on {review['date']}"
+            lines.append(f"- `{name}`: ground truth accepted by {signed}: {review['note']}.")
+    return lines
 
 
 def distribution(frames: Sequence[Row]) -> str:

@@ -25,6 +25,7 @@ def write_pages(
     sequences: Sequence[Mapping[str, Any]],
     frames: Sequence[Mapping[str, Any]],
     quality: Sequence[Mapping[str, Any]],
+    reviews: Mapping[str, Mapping[str, Any]],
     retracted: int,
     terms: Mapping[str, Any],
     about: Mapping[str, Any],
@@ -39,6 +40,7 @@ def write_pages(
     templates : folder `release/`.
     release : document `release`; sequences, frames : rows of these tables.
     quality : documents `quality` of the sequences. retracted : rows of the table of retractions.
+    reviews : of the ground truth, by sequence.
     terms : the licence's entry of `config/licenses.yaml`.
     about : title, creator, authors, contact and url from the settings.
     gate : what readers of a gated repository agree to, None for an open one.
@@ -74,7 +76,7 @@ def write_pages(
         "place_table": card_tables.places(sequences),
         "sequence_table": card_tables.sequence_table(sequences),
         "quality_table": card_tables.quality_figures(quality),
-        "known_issues": card_tables.known_issues(release, sequences, frames, retracted),
+        "known_issues": card_tables.known_issues(release, sequences, frames, reviews, retracted),
     }
     for name in FILLED:
         template = templates / f"{name}.tmpl"
