@@ -136,6 +136,14 @@ SEALED: dict[str, tuple[Corruption, str]] = {
     ),
     "box counts": (cell(TRAIN, "boxes_negative", 0, 5), r"1 positive and 1 negative boxes, its frame says"),
     "ground-truth count": (cell(TRAIN, "gt_points", 0, 4), r"has 5 points, its frame says 4"),
+    "a right image of another time": (
+        cell(TRAIN, "right_t_ns", 0, 0),
+        r"frame 0 has a right image of another time",
+    ),
+    "a right image without a time": (
+        cell(TRAIN, "right_t_ns", 0, None),
+        r"frame 0 has a right image without a time",
+    ),
     "another place": (cell(TRAIN, "place", 0, "elsewhere"), r"frame 0 has another place than its sequence"),
     "frames of a sequence": (cell(SEQUENCES, "frames", 0, 7), r"states 7 frames, found 6"),
     "bytes of a sequence": (cell(SEQUENCES, "bytes", 0, 1), r"states 1 bytes"),

@@ -9,6 +9,8 @@ from card.packaging.checks.jpeg import jpeg_problems
 from card.packaging.modalities import LIDARS
 from card.packaging.retractions import remains
 
+PAIR_NS = 1_000_000
+"""Right images pair within 1 ms, whatever a team's ingest was told."""
 PER_FRAME = ("camera_left", "camera_right", "ground_truth", "labels")
 
 
@@ -39,6 +41,10 @@ def _check_frames(contents: Contents) -> Iterator[str]:
     for row in frames:
         if row["sequence"] not in known:
             yield f"metadata/frames: {_name(row)} belongs to no sequence of metadata/sequences.parquet"
+        if row["right_t_ns"] is not None and abs(row["right_t_ns"] - row["t_ns"]) > PAIR_NS:
+            yield f"metadata/frames: {_name(row)} has a right image of another time"
+        if row["has_camera_right"] and row["right_t_ns"] is None:
+            yield f"metadata/frames: {_name(row)} has a right image without a time"
         for modality in PER_FRAME:
             if row[f"has_{modality}"] != ((modality, row["sequence"], row["frame"], None) in packed):
                 yield f"metadata/frames: {_name(row)} has_{modality} contradicts the member table"
