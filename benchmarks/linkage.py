@@ -1,7 +1,7 @@
 """The linkage attack: does a redacted face lead to a near-identical capture of the same person?
 
-An attacker has such captures of a hundred people, other frames or the stereo partner, redacts them alike, and takes
-the one most like the redacted face he wants to name.
+An attacker has such captures of a hundred people, other frames or the stereo partner, redacts them alike, and
+takes the one most like the redacted face he wants to name.
 """
 
 import io

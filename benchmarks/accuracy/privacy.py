@@ -7,6 +7,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+from linkage import PEOPLE, blurred, filled, linked_pct
 from numpy.typing import NDArray
 
 from card.artifacts import default_settings, read_table
@@ -49,9 +50,12 @@ def rows(work: Path, truth: Path, sequences: Sequence[str]) -> list[dict[str, An
         _row(figure.name, figure.value, AIM_PCT if figure.name.endswith(("_pct", "_low")) else None)
         for figure in figures
     ]
-    return simulated + [
-        _row(f"recall_real_face_pct_{px}px", real_face_recall(px), None) for px in REAL_FACE_PX
+    real = [_row(f"recall_real_face_pct_{px}px", real_face_recall(px), None) for px in REAL_FACE_PX]
+    linkage = [
+        _row("linkage_fill_pct", linked_pct(filled), 100 / PEOPLE, "lower"),
+        _row("linkage_blur_pct", linked_pct(blurred), None, "lower"),
     ]
+    return simulated + real + linkage
 
 
 def real_face_recall(height_px: int) -> float:
@@ -93,12 +97,12 @@ def _crowd(
     return np.ascontiguousarray(background), boxes
 
 
-def _row(figure: str, value: float | None, aim: float | None) -> dict[str, Any]:
+def _row(figure: str, value: float | None, aim: float | None, better: str = "higher") -> dict[str, Any]:
     return {
         "stage": "privacy",
         "figure": figure,
         "value": value,
         "unit": "%",
         "aim": aim,
-        "better": "higher",
+        "better": better,
     }
