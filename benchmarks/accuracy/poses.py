@@ -1,4 +1,4 @@
-"""Trajectory errors against the simulated motion: ATE, RPE over a second, and tilt."""
+"""Trajectory errors against the simulated motion: ATE, RPE over a second, tilt, height at revisits."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,7 +11,14 @@ from card.artifacts import read_table
 from card.geometry import Trajectory, apply, inverse
 
 Array = NDArray[np.float64]
-AIMS = {"ate_cm": (1.5, "cm"), "rpe_1s_cm": (0.4, "cm"), "tilt_deg": (0.01, "deg")}
+AIMS = {
+    "ate_cm": (1.5, "cm"),
+    "rpe_1s_cm": (0.4, "cm"),
+    "tilt_deg": (0.01, "deg"),
+    "revisit_z_mm": (5.0, "mm"),
+}
+#: Two visits of a place: so near, m, with so much way between, m; looked for at times so far apart, ns.
+REVISIT_M, REVISIT_WAY_M, REVISIT_STEP_NS = 5.0, 80.0, 500_000_000
 SECOND_NS = 1_000_000_000
 
 
@@ -30,7 +37,7 @@ def rows(work: Path, truth: Path, sequences: Sequence[str]) -> list[dict[str, An
         {
             "stage": "poses",
             "figure": figure,
-            "value": float(np.median([error[figure] for error in errors])) if errors else None,
+            "value": _median([error[figure] for error in errors]),
             "unit": unit,
             "aim": aim,
             "better": "lower",
@@ -43,7 +50,8 @@ def trajectory_errors(found: Trajectory, true: Trajectory) -> dict[str, float]:
     """Root mean squares at the times of `found` that `true` covers.
 
     ate_cm : positions after the best rigid alignment. rpe_1s_cm : translation of the relative pose over 1 s.
-    tilt_deg : angle between the two directions of up, seen from the rig.
+    tilt_deg : angle between the two directions of up, seen from the rig. revisit_z_mm : median
+    over all second visits of a place of how wrong the difference in height to the first is; NaN without any.
     """
     t_ns = found.t_ns[(found.t_ns >= true.start_ns) & (found.t_ns <= true.end_ns)]
     poses, reference = found.at(t_ns), true.at(t_ns)
@@ -60,7 +68,24 @@ def trajectory_errors(found: Trajectory, true: Trajectory) -> dict[str, float]:
         "ate_cm": 100 * _rms(ate),
         "rpe_1s_cm": 100 * _rms(rpe),
         "tilt_deg": _rms(np.degrees(np.arcsin(sine))),
+        "revisit_z_mm": 1e3 * revisit_z(found, true),
     }
+
+
+def revisit_z(found: Trajectory, true: Trajectory) -> float:
+    """Median error of the difference in height between the first and a later visit of a place, m."""
+    start, end = max(found.start_ns, true.start_ns), min(found.end_ns, true.end_ns)
+    t_ns = np.arange(start, end, REVISIT_STEP_NS)
+    position = true.at(t_ns)[:, :3, 3]
+    error = found.at(t_ns)[:, 2, 3] - position[:, 2]
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(position, axis=0), axis=1))])
+    differences = []
+    for later in range(len(t_ns)):
+        distance = np.linalg.norm(position - position[later], axis=1)
+        distance[way > way[later] - REVISIT_WAY_M] = np.inf
+        if distance.min() < REVISIT_M:
+            differences.append(abs(error[later] - error[int(np.argmin(distance))]))
+    return float(np.median(differences)) if differences else float("nan")
 
 
 def align(points: Array, reference: Array) -> Array:
@@ -72,6 +97,11 @@ def align(points: Array, reference: Array) -> Array:
     result[:3, :3] = rotation
     result[:3, 3] = reference_center - rotation @ center
     return result
+
+
+def _median(values: Sequence[float]) -> float | None:
+    known = [value for value in values if np.isfinite(value)]
+    return float(np.median(known)) if known else None
 
 
 def _rms(values: Array) -> float:

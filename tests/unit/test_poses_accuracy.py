@@ -62,6 +62,40 @@ def test_a_constant_drift_shows_in_rpe() -> None:
     assert errors["rpe_1s_cm"] == pytest.approx(0.2, rel=1e-3)
 
 
+def test_errors_are_those_of_evo() -> None:
+    from evo.core import metrics, sync
+    from evo.core.trajectory import PoseTrajectory3D
+
+    rng = np.random.default_rng(3)
+    true, found = bend(), bend()
+    found[:, :3, 3] += np.cumsum(rng.normal(0, 2e-3, (len(found), 3)), axis=0)
+    found = transform([1, 2, 3], [np.cos(0.2), 0, 0, np.sin(0.2)]) @ found
+    seconds = np.arange(len(true)) * 0.02
+    theirs = [PoseTrajectory3D(poses_se3=list(poses), timestamps=seconds) for poses in (true, found)]
+    reference, estimate = sync.associate_trajectories(*theirs)
+    rpe = metrics.RPE(
+        metrics.PoseRelation.translation_part, delta=50, delta_unit=metrics.Unit.frames, all_pairs=True
+    )
+    rpe.process_data((reference, estimate))
+    estimate.align(reference)
+    ate = metrics.APE(metrics.PoseRelation.translation_part)
+    ate.process_data((reference, estimate))
+    errors = accuracy("poses").trajectory_errors(trajectory(found), trajectory(true))
+    assert errors["ate_cm"] == pytest.approx(100 * ate.get_statistic(metrics.StatisticsType.rmse), rel=1e-6)
+    assert errors["rpe_1s_cm"] == pytest.approx(
+        100 * rpe.get_statistic(metrics.StatisticsType.rmse), rel=1e-6
+    )
+
+
+def test_a_second_round_that_lies_higher_shows_at_revisits() -> None:
+    angle = np.linspace(0, 4 * np.pi, 1201)
+    flat = np.stack([20 * np.cos(angle), 20 * np.sin(angle), 0 * angle], axis=1)
+    higher = flat + np.outer(angle > 2 * np.pi, [0, 0, 0.02])
+    errors = accuracy("poses").trajectory_errors(trajectory(transform(higher)), trajectory(transform(flat)))
+    assert errors["revisit_z_mm"] == pytest.approx(20, abs=0.5)
+    assert np.isnan(accuracy("poses").revisit_z(trajectory(bend()), trajectory(bend())))
+
+
 def test_bundle_errors_are_those_put_in() -> None:
     module = accuracy("calibration")
     true = true_calibration("2026-04-14-start", 1, "tiny")
@@ -77,6 +111,6 @@ def test_bundle_errors_are_those_put_in() -> None:
 
 
 def test_missing_results_give_no_value(tmp_path: Path) -> None:
-    for stage, count in (("poses", 3), ("wheels", 3), ("calibration", 7)):
+    for stage, count in (("poses", 4), ("wheels", 3), ("calibration", 7)):
         rows = accuracy(stage).rows(tmp_path, tmp_path, ["nowhere"])
         assert [row["value"] for row in rows] == [None] * count

@@ -49,7 +49,8 @@ def travelled(poses: Array) -> Array:
 def candidates(poses: Array, spacing_m: float, radius_m: float, min_way_m: float) -> list[tuple[int, int]]:
     """Pairs (earlier, later) of poses (N, 4, 4) that lie within a radius, the later ones `spacing_m` apart.
 
-    Of every earlier pass through the radius the nearest node counts; passes are runs of nodes in a row.
+    Of the first and the last earlier pass through the radius the nearest node counts; passes are runs of
+    nodes in a row. More passes would say little more, and a drive of many rounds would have too many.
     """
     way, position = travelled(poses), poses[:, :3, 3]
     pairs = []
@@ -63,7 +64,8 @@ def candidates(poses: Array, spacing_m: float, radius_m: float, min_way_m: float
         if not len(inside):
             continue
         last = way[later]
-        for run in np.split(inside, np.flatnonzero(np.diff(inside) > 1) + 1):
+        runs = np.split(inside, np.flatnonzero(np.diff(inside) > 1) + 1)
+        for run in runs[:1] + runs[1:][-1:]:
             pairs.append((int(earlier[run[np.argmin(distance[run])]]), later))
     return pairs
 
