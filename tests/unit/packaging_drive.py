@@ -24,7 +24,6 @@ from card.artifacts import (
     write_report,
     write_table,
 )
-from card.artifacts.schemas import schema_folder
 from card.packaging.assemble import assemble
 from card.packaging.licenses import read_licenses
 from card.packaging.pack import pack_sequence
@@ -162,7 +161,6 @@ def assemble_tree(
         terms=terms,
         sequences=sequences,
         release_folder=_pages(work, version),
-        schemas=schema_folder(),
         split_report=split_report,
         takedowns=takedowns,
         reviews=reviews,

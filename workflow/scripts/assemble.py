@@ -3,7 +3,6 @@
 from pathlib import Path
 
 from card.artifacts import logged
-from card.artifacts.schemas import schema_folder
 from card.packaging.assemble import assemble
 
 records = [Path(path).parent for path in snakemake.input.records if path.endswith("release.json")]
@@ -19,7 +18,6 @@ with logged(Path(snakemake.log[0])):
             for name, package in zip(snakemake.params.sequences, snakemake.input.packages, strict=True)
         ],
         release_folder=Path(snakemake.input.changelog).parent,
-        schemas=schema_folder(),
         split_report=Path(snakemake.input.split_report),
         takedowns=snakemake.params.takedowns,
         reviews=snakemake.params.reviews,

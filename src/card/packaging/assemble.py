@@ -15,6 +15,7 @@ from card.artifacts import (
     write_report,
     write_table,
 )
+from card.artifacts.schemas import schema_folder
 from card.packaging.croissant import croissant
 from card.packaging.files_table import file_columns
 from card.packaging.metadata import write_metadata
@@ -54,7 +55,6 @@ def assemble(
     terms: Mapping[str, Any],
     sequences: Sequence[Mapping[str, Any]],
     release_folder: Path,
-    schemas: Path,
     split_report: Path | None,
     takedowns: Sequence[Mapping[str, Any]],
     reviews: Mapping[str, Mapping[str, Any]],
@@ -70,7 +70,7 @@ def assemble(
     ----------
     spdx, terms : the tree's licence and its entry of `config/licenses.yaml`.
     sequences : {id, package, splits} each: a package folder and the table of splits, None without frames.
-    release_folder : templates and licence texts; schemas : folder of the schemas that ship with the tree.
+    release_folder : templates and licence texts.
     split_report : report of the splits' leakage and balance, None without.
 
     takedowns : entries of `read_takedowns` about sequences of this tree.
@@ -108,7 +108,8 @@ def assemble(
         write_table(tree / "mini" / "mini.parquet", mini, "release_mini")
         (tree / "schemas").mkdir()
         for name in SHIPPED_SCHEMAS:
-            shutil.copyfile(schemas / f"{name}.schema.json", tree / "schemas" / f"{name}.schema.json")
+            file = f"{name}.schema.json"
+            shutil.copyfile(schema_folder() / file, tree / "schemas" / file)
 
         document = {
             "schema": "release",
