@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from packaging_drive import FRAMES, SETTINGS, assemble_tree, sheet_row, write_drive, write_splits
 
+from card.artifacts import read_table
 from card.cli import main
 from card.errors import CardError
 from card.packaging.neighbours import neighbours
@@ -83,6 +84,8 @@ def test_a_purged_tree_holds_nothing_of_what_was_retracted(
     ]
     assert not any(secret in left for secret in secrets)
     assert not (copy / "sequences" / "de_two").exists()
+    redactions = copy / "sequences" / "de_one" / "redactions.parquet"
+    assert 3 not in read_table(redactions, "redactions")["frame"].to_pylist()
     kept = Release(copy)
     for key, _ in kept.names():
         kept.read(key[0], key[2], key[1])

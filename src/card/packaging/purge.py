@@ -18,6 +18,7 @@ from card.artifacts import (
 from card.packaging.files_table import file_columns
 from card.packaging.reader import SPLITS, Release
 from card.packaging.reader.verify import SUMS, read_sums
+from card.packaging.redactions import redactions_of_kept
 from card.packaging.shards import Source, write_shards
 
 MEMBERS = "metadata/members.parquet"
@@ -107,6 +108,9 @@ def _rewrite_tree(copy: Path, members: Rows, bad: set[str], whole: set[str], rel
                 row[f"has_{lidar}"] = (lidar, row["sequence"], row[f"{lidar}_burst"]) in packed
         _write(path, rows, "release_frames")
         frames += rows
+    for path in sorted(copy.glob("sequences/*/redactions.parquet")):
+        taken = {frame for sequence, frame in gone if sequence == path.parent.name}
+        write_table(path, redactions_of_kept(path, taken), "redactions")
     pictured = {(row["sequence"], row["frame"]) for row in frames if row["has_camera_left"]}
     mini = read_table(copy / "mini/mini.parquet", "release_mini").to_pylist()
     edited = {(s["sequence"], s["frame"]) for s in stones if s["modality"] == "camera_left" and s["region"]}
