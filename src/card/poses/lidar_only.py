@@ -1,6 +1,7 @@
 """Odometry from scans alone, for the start of a drive and for checks of the IMU: it trusts no IMU at all."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -23,8 +24,13 @@ _KNOTS = 11
 _WIDEN = 10.0
 
 
-def scan_trajectory(scans: Sequence[Scan], leaf_m: float, planes: PlaneSettings) -> Trajectory:
-    """Poses of the rig at the ends of two scans or more, in the frame of the first.
+def scan_trajectory(
+    scans: Sequence[Scan], leaf_m: float, planes: PlaneSettings
+) -> tuple[Trajectory, Trajectory]:
+    """Poses of the rig at the ends, and in the middle, of two scans or more, in the frame of the first end.
+
+    The middle is what a scan tells best: its end follows from there by the constant velocity, and lags where
+    the car speeds up or turns in.
 
     Scans are straightened with the constant turn and velocity that the last two poses tell of, and again with
     those that come out (as I. Vizzo et al., "KISS-ICP", RA-L 2023).
@@ -35,21 +41,45 @@ def scan_trajectory(scans: Sequence[Scan], leaf_m: float, planes: PlaneSettings)
         If the first two scans cannot be registered at any speed of a car.
     """
     twist = _first_twist(scans[0], scans[1], leaf_m, planes)
-    poses = [np.eye(4)]
+    first = _run(scans, [twist], leaf_m, planes)
+    # A step's twist is that of its middle, half a scan before the scan's own: take it from both neighbours.
+    steps = np.stack([twist, *first.twists[1:], first.twists[-1]])
+    second = _run(scans, list(0.5 * (steps[:-1] + steps[1:])), leaf_m, planes)
+    middles = [
+        pose @ _moved(t, _half(s)) for pose, t, s in zip(second.poses, second.twists, scans, strict=True)
+    ]
+    ends = [scan.end_ns for scan in scans]
+    return (
+        _trajectory(ends, second.poses),
+        _trajectory([(scan.start_ns + scan.end_ns) // 2 for scan in scans], middles),
+    )
+
+
+@dataclass(frozen=True)
+class _Pass:
+    """poses at the scans' ends, and the twists: of the steps to them, or as given."""
+
+    poses: list[Array]
+    twists: list[Array]
+
+
+def _run(scans: Sequence[Scan], given: list[Array], leaf_m: float, planes: PlaneSettings) -> _Pass:
+    """Register scan by scan, straightened by given twists, or by those that come out if only the first is."""
+    poses, twists = [np.eye(4)], [given[0]]
     grid = PlaneMap(planes, horizon=60)
-    grid.insert(straightened(scans[0], twist, leaf_m / 5))
-    for before, scan in pairwise(scans):
+    grid.insert(straightened(scans[0], given[0], leaf_m / 5))
+    for k, (before, scan) in enumerate(pairwise(scans), 1):
         seconds = (scan.end_ns - before.end_ns) * 1e-9
-        for _ in range(2):
+        known = len(given) > 1
+        twist = given[k] if known else twists[-1]
+        for _ in range(1 if known else 2):
             points = straightened(scan, twist, leaf_m)
             found = grid.register(points, poses[-1] @ _moved(twist, seconds), widen=_WIDEN)
-            twist = _twist(inverse(poses[-1]) @ found.map_from_scan, seconds)
+            twist = twist if known else _twist(inverse(poses[-1]) @ found.map_from_scan, seconds)
         poses.append(found.map_from_scan)
+        twists.append(twist)
         grid.insert(apply(found.map_from_scan, straightened(scan, twist, leaf_m / 5)))
-    stack = np.stack(poses)
-    return Trajectory(
-        [scan.end_ns for scan in scans], stack[:, :3, 3], quaternion_from_matrix(stack[:, :3, :3])
-    )
+    return _Pass(poses, twists)
 
 
 def straightened(scan: Scan, twist: Array, leaf_m: float) -> Array:
@@ -82,6 +112,15 @@ def _first_twist(first: Scan, second: Scan, leaf_m: float, planes: PlaneSettings
             wanted=f"at least {100 * MIN_SCORE:.0f} %",
         )
     return best[1]
+
+
+def _half(scan: Scan) -> float:
+    return (scan.start_ns - scan.end_ns) * 0.5e-9
+
+
+def _trajectory(t_ns: Sequence[int], poses: Sequence[Array]) -> Trajectory:
+    stack = np.stack(poses)
+    return Trajectory(t_ns, stack[:, :3, 3], quaternion_from_matrix(stack[:, :3, :3]))
 
 
 def _moved(twist: Array, seconds: float) -> Array:

@@ -60,7 +60,7 @@ def run_odometry(scans: Scans, imu: Imu, settings: Mapping[str, Any]) -> list[St
     until = scans.end_ns[first] + settings["start_s"] * 1e9
     opening = [scans[i] for i in same[:2] + [i for i in same[2:] if scans.end_ns[i] <= until]]
     planes = plane_settings(settings)
-    path = scan_trajectory(opening, settings["scan_leaf_m"], planes)
+    path, _ = scan_trajectory(opening, settings["scan_leaf_m"], planes)
     odometry = Odometry(start_state(imu, path, settings["gravity_m_s2"]), imu, settings)
     odometry.begin(opening[0])
     steps = [Step(first, odometry.states[-1], None)]

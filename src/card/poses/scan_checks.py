@@ -72,7 +72,7 @@ def check_against_scans(
     notes = []
     chosen = _liveliest(scans, imu, settings["check_s"])
     try:
-        path = scan_trajectory([scans[i] for i in chosen], settings["scan_leaf_m"], planes)
+        _, path = scan_trajectory([scans[i] for i in chosen], settings["scan_leaf_m"], planes)
     except CardError as error:
         notes.append(f"IMU and scans could not be compared: {error}")
     else:
