@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from references import SYSTEMS, reference_trajectories
 
 from card.artifacts import read_table
 from card.geometry import Trajectory, apply, inverse
@@ -23,25 +24,28 @@ SECOND_NS = 1_000_000_000
 
 
 def rows(work: Path, truth: Path, sequences: Sequence[str]) -> list[dict[str, Any]]:
-    """Medians over the sequences of the root mean square errors.
+    """Medians over the sequences of the root mean square errors, ours and those of other systems.
 
     work : folder with ``results/<id>/trajectory.parquet``; truth : with ``<id>/trajectory.parquet``.
     """
-    errors: list[dict[str, float]] = []
+    errors: dict[str, list[dict[str, float]]] = {"": [], **{f"_{system}": [] for system in SYSTEMS}}
     for sequence in sequences:
         files = [work / "results" / sequence / "trajectory.parquet", truth / sequence / "trajectory.parquet"]
         if all(file.is_file() for file in files):
             found, true = (Trajectory.from_table(read_table(file, "trajectory")) for file in files)
-            errors.append(trajectory_errors(found, true))
+            errors[""].append(trajectory_errors(found, true))
+            for system, other in reference_trajectories(work, sequence).items():
+                errors[f"_{system}"].append(trajectory_errors(other, true))
     return [
         {
             "stage": "poses",
-            "figure": figure,
-            "value": _median([error[figure] for error in errors]),
+            "figure": figure + suffix,
+            "value": _median([error[figure] for error in listed]),
             "unit": unit,
-            "aim": aim,
+            "aim": None if suffix else aim,
             "better": "lower",
         }
+        for suffix, listed in errors.items()
         for figure, (aim, unit) in AIMS.items()
     ]
 
