@@ -148,7 +148,9 @@ def write_poses(results: Path, times: list[int]) -> None:
         "samples": [[float(times[0]), 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]],
         "points": [10],
         "residual_m": [0.001],
+        "std_m": [0.001],
         "gap": [False],
+        "uncertain": [False],
     }
     wheels = dict.fromkeys(("fl", "fr", "rl", "rr"), sample)
     write_json(

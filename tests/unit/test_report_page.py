@@ -109,7 +109,9 @@ def write_sequence(folder: Path, stages: dict[str, Any]) -> None:
             "samples": samples,
             "points": np.where(gap, 0, 30),
             "residual_m": [None if g else 0.004 for g in gap],
+            "std_m": np.where(gap, 0.04, 0.001),
             "gap": gap,
+            "uncertain": gap,
         }
     document = {"schema": "wheel_excitation", "wheels": wheels}
     write_json(folder / "wheel_excitation.json", document, "wheel_excitation")

@@ -59,7 +59,7 @@ def trajectory() -> Trajectory:
 
 def scan(path: Trajectory, rig_from_lidar: Array, t_ns: int, sign: int, rng: np.random.Generator) -> Burst:
     """Ground returns 3 to 14 m before (sign 1) or behind (-1) the sensor, skewed by the car's motion."""
-    offset = np.sort(rng.integers(0, BURST_NS - 1_000_000, 1500)).astype(np.uint32)
+    offset = np.sort(rng.integers(0, BURST_NS - 1_000_000, 4000)).astype(np.uint32)
     world_from_lidar = path.at(t_ns + offset.astype(np.int64)) @ rig_from_lidar
     x = rng.uniform(-2.5, 2.5, offset.size)
     y = world_from_lidar[:, 1, 3] + sign * rng.uniform(3, 14, offset.size)

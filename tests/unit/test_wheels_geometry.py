@@ -7,10 +7,10 @@ from scipy.spatial.transform import Rotation
 
 from card.artifacts import default_settings
 from card.geometry import Trajectory
-from card.wheels.arc_height import Corridor, corridor_samples, project
+from card.wheels.arc_height import Corridor, RoadPoints, corridor_points, project
 from card.wheels.contact_path import ContactPath, contact_path
 from card.wheels.profile import SplineSettings
-from card.wheels.wheel_fit import GapSettings, fit_excitation
+from card.wheels.wheel_fit import Excitation, QualitySettings, fit_excitation
 
 Array = NDArray[np.float64]
 CONTACT = np.array([-0.8, 1.0, -1.7])
@@ -33,9 +33,18 @@ def swaying() -> ContactPath:
     return contact_path(trajectory(6 * t, heave=0.03 * np.sin(5 * t), euler_zxy=euler), CONTACT, STEP_M)
 
 
-def spline() -> SplineSettings:
-    defaults = default_settings("wheels")
-    return SplineSettings(**{name: defaults[name] for name in SplineSettings.__dataclass_fields__})
+def fit(path: ContactPath, road: RoadPoints, **changes: float) -> Excitation:
+    """The excitation with the default settings but for some changes."""
+    defaults = default_settings("wheels") | changes
+    spline = SplineSettings(**{name: defaults[name] for name in SplineSettings.__dataclass_fields__})
+    quality = QualitySettings(**{name: defaults[name] for name in QualitySettings.__dataclass_fields__})
+    return fit_excitation(path, road, spline, quality, defaults["footprint_m"])
+
+
+def level(arc: Array, height: float) -> RoadPoints:
+    """Points of one height at arc lengths (Q,), spread over the corridor."""
+    sideways = 0.1 * np.sin(7.0 * np.arange(len(arc)))
+    return RoadPoints(arc, sideways, np.full(len(arc), height), np.zeros(len(arc), dtype=np.int64))
 
 
 def test_arc_length_and_height_follow_the_paper() -> None:
@@ -86,9 +95,10 @@ def test_standing_adds_no_arc_length() -> None:
 
 def test_a_car_that_never_moves_has_a_path() -> None:
     path = contact_path(trajectory(np.zeros(50)), CONTACT, STEP_M)
-    excitation = fit_excitation(path, np.zeros(0), np.zeros(0), spline(), GapSettings(0.2, 3))
+    excitation = fit(path, RoadPoints.joined([]))
     np.testing.assert_allclose(excitation.position, np.tile([-0.8, 1.0, 0.0], (50, 1)), atol=1e-12)
     assert excitation.gap.all()
+    assert excitation.uncertain.all()
 
 
 def test_reverse_starts_a_run_and_takes_the_points_again() -> None:
@@ -97,9 +107,9 @@ def test_reverse_starts_a_run_and_takes_the_points_again() -> None:
     assert path.knot_arc[-1] == pytest.approx(16, abs=0.1)
     assert sorted(set(path.run)) == [0, 1]
     points = np.array([[-0.8, 1.0 + 7.0, 0.02]])
-    arc, height = corridor_samples(points, path, (-100.0, 100.0), Corridor(0.12, 0.35))
-    np.testing.assert_allclose(np.sort(arc), [7, 13], atol=0.06)
-    np.testing.assert_allclose(height, 0.02, atol=1e-9)
+    road = corridor_points(points, path, (-100.0, 100.0), Corridor(0.12, 0.35))
+    np.testing.assert_allclose(np.sort(road.arc), [7, 13], atol=0.06)
+    np.testing.assert_allclose(road.height, 0.02, atol=1e-9)
 
 
 def test_a_second_pass_keeps_its_own_points() -> None:
@@ -114,11 +124,22 @@ def test_a_second_pass_keeps_its_own_points() -> None:
     lap = path.knot_arc[-1] / 2
     k = int(np.searchsorted(path.knot_arc, lap * 1.25))
     point = path.knot_position[k : k + 1]
-    arc, height = corridor_samples(point, path, (1.1 * lap, 1.4 * lap), Corridor(0.12, 0.35))
-    np.testing.assert_allclose(arc, [path.knot_arc[k]], atol=1e-9)
-    np.testing.assert_allclose(height, [0], atol=1e-9)
-    arc, height = corridor_samples(point, path, (0.1 * lap, 0.4 * lap), Corridor(0.12, 0.35))
-    np.testing.assert_allclose(height, [0.05], atol=1e-6)
+    second = corridor_points(point, path, (1.1 * lap, 1.4 * lap), Corridor(0.12, 0.35))
+    np.testing.assert_allclose(second.arc, [path.knot_arc[k]], atol=1e-9)
+    np.testing.assert_allclose(second.height, [0], atol=1e-9)
+    first = corridor_points(point, path, (0.1 * lap, 0.4 * lap), Corridor(0.12, 0.35))
+    np.testing.assert_allclose(first.height, [0.05], atol=1e-6)
+
+
+def test_a_run_that_ends_still_has_its_footprint() -> None:
+    """A car drives up a slope of 10 %, stands and goes back: at the turn nothing is missing."""
+    along = np.concatenate([np.linspace(0, 10, 200), np.full(50, 10.0), np.linspace(10, 2, 160)])
+    path = contact_path(trajectory(along, heave=0.1 * along), CONTACT, STEP_M)
+    y = np.linspace(0, 13, 6000)
+    points = np.stack([-0.8 + 0.1 * np.sin(7.0 * np.arange(y.size)), y, 0.1 * (y - 1) + 0.01], axis=1)
+    found = fit(path, corridor_points(points, path, (-1, 30), Corridor(0.12, 0.35, 0.17)))
+    assert found.measured.all()
+    np.testing.assert_allclose(found.position[:, 2] - 0.1 * (found.position[:, 1] - 1), 0.01, atol=1e-4)
 
 
 def test_the_corridor_has_walls_and_ends() -> None:
@@ -127,12 +148,9 @@ def test_the_corridor_has_walls_and_ends() -> None:
     inside = [[0.119, 0, 0], [-0.119, 0, 0], [0, 0, 0.349], [0, 0, -0.349]]
     outside = [[0.121, 0, 0], [-0.121, 0, 0], [0, 0, 0.351], [0, -5.2, 0], [0, 5.2, 0]]
     corridor = Corridor(0.12, 0.35)
-    arc, _ = corridor_samples(base + np.array(inside), path, (0, 20), corridor)
-    assert len(arc) == 4
-    arc, _ = corridor_samples(base + np.array(outside), path, (0, 20), corridor)
-    assert len(arc) == 0
-    arc, _ = corridor_samples(base + np.array(inside), path, (5.2, 20), corridor)
-    assert len(arc) == 0
+    assert len(corridor_points(base + np.array(inside), path, (0, 20), corridor)) == 4
+    assert len(corridor_points(base + np.array(outside), path, (0, 20), corridor)) == 0
+    assert len(corridor_points(base + np.array(inside), path, (5.2, 20), corridor)) == 0
 
 
 def road(y: Array) -> Array:
@@ -148,8 +166,7 @@ def test_a_bump_under_a_swaying_body_is_recovered() -> None:
     rng = np.random.default_rng(5)
     y = rng.uniform(0, 31, 6000)
     points = np.stack([-0.8 + rng.uniform(-0.15, 0.15, y.size), y, road(y)], axis=1)
-    arc, height = corridor_samples(points, path, (-1, 100), Corridor(0.12, 0.35))
-    found = fit_excitation(path, arc, height, spline(), GapSettings(0.2, 3))
+    found = fit(path, corridor_points(points, path, (-1, 100), Corridor(0.12, 0.35)))
     inner = slice(20, -20)
     error = found.position[inner, 2] - road(found.position[inner, 1])
     assert np.abs(error).max() < 1e-3
@@ -160,7 +177,7 @@ def test_a_bump_under_a_swaying_body_is_recovered() -> None:
 def test_a_gap_is_flagged_and_the_rest_is_not() -> None:
     path = contact_path(trajectory(np.linspace(0, 30, 600)), CONTACT, STEP_M)
     arc = np.concatenate([np.linspace(2, 10, 400), np.linspace(14, 28, 700)])
-    found = fit_excitation(path, arc, np.full(arc.size, 0.03), spline(), GapSettings(0.2, 3))
+    found = fit(path, level(arc, 0.03))
     gap = ((path.arc > 10.2) & (path.arc < 13.8)) | (path.arc < 1.8) | (path.arc > 28.2)
     near = np.abs(np.subtract.outer(path.arc, [1.8, 10.2, 13.8, 28.2])).min(axis=1) < 0.05
     np.testing.assert_array_equal(found.gap[~near], gap[~near])
@@ -175,17 +192,75 @@ def test_a_dive_while_standing_leaves_the_road_where_it_is() -> None:
     path = contact_path(trajectory(along, heave=dive), CONTACT, STEP_M)
     y = np.linspace(1, 11, 1000)
     points = np.stack([np.full_like(y, -0.8), y, np.full_like(y, 0.01)], axis=1)
-    arc, height = corridor_samples(points, path, (-1, 20), Corridor(0.12, 0.35))
-    found = fit_excitation(path, arc, height, spline(), GapSettings(0.2, 3))
+    found = fit(path, corridor_points(points, path, (-1, 20), Corridor(0.12, 0.35)))
     np.testing.assert_allclose(found.position[10:, 2], 0.01, atol=1e-5)
 
 
 def test_contacts_between_samples_are_interpolated() -> None:
     path = contact_path(trajectory(np.linspace(0, 10, 200)), CONTACT, STEP_M)
     arc = np.linspace(0, 10, 1000)
-    found = fit_excitation(path, arc, np.zeros(arc.size), spline(), GapSettings(0.2, 3))
-    position, gap = found.at(path.t_ns[[40, 80]] + 5_000_000)
+    found = fit(path, level(arc, 0.0))
+    position, measured = found.at(path.t_ns[[40, 80]] + 5_000_000)
     np.testing.assert_allclose(
         position, (found.position[[40, 80]] + found.position[[41, 81]]) / 2, atol=1e-12
     )
-    assert not gap.any()
+    assert measured.all()
+
+
+def test_a_hole_that_few_beams_reach_is_uncertain() -> None:
+    """A hole 0.4 m long and 6 cm deep of which the far wall shows and the floor does not."""
+    path = contact_path(trajectory(np.linspace(0, 30, 600)), CONTACT, STEP_M)
+    arc = np.linspace(1, 29, 5000)
+    over = level(arc[(arc < 14) | (arc > 14.4)], 0.0)
+    wall = level(np.array([14.37, 14.38, 14.39]), -0.03)
+    found = fit(path, RoadPoints.joined([over, wall]))
+    inside = (path.arc > 14.02) & (path.arc < 14.38)
+    assert found.uncertain[inside].all()
+    assert found.measured[(path.arc > 2) & (path.arc < 13.7)].all()
+    assert found.measured[(path.arc > 14.7) & (path.arc < 28)].all()
+
+
+def test_a_tyre_half_over_an_edge_stands_on_the_mean() -> None:
+    """A hole 6 cm deep under the right half of the corridor: the footprint's mean is 3 cm down."""
+    path = contact_path(trajectory(np.linspace(0, 30, 600)), CONTACT, STEP_M)
+    rng = np.random.default_rng(6)
+    arc = rng.uniform(1, 29, 12000)
+    sideways = rng.uniform(-0.12, 0.12, arc.size)
+    hole = (np.abs(arc - 15) < 1) & (sideways > 0)
+    height = np.where(hole, -0.06, 0.0) + rng.normal(0, 0.002, arc.size)
+    road = RoadPoints(arc, sideways, height, np.zeros(arc.size, dtype=np.int64))
+    found = fit(path, road)
+    np.testing.assert_allclose(found.position[np.abs(path.arc - 15) < 0.7, 2], -0.03, atol=5e-3)
+    np.testing.assert_allclose(found.position[np.abs(path.arc - 15) > 1.5, 2][30:-30], 0, atol=1e-3)
+    # A spline that may not tilt takes one of the two levels.
+    stiff = fit(path, road, tilt_penalty=1e9)
+    assert np.abs(stiff.position[np.abs(path.arc - 15) < 0.7, 2] + 0.03).max() > 0.015
+
+
+def test_a_sharp_turn_keeps_its_road() -> None:
+    """A quarter circle of 4 m radius: the inner wheel's is 3.2 m, and a bump lies across its middle."""
+    angle = np.linspace(0, np.pi / 2, 500)
+    outer = contact_path(turn(angle), [0.8, 0.0, -1.7], STEP_M)
+    inner = contact_path(turn(angle), [-0.8, 0.0, -1.7], STEP_M)
+    assert outer.knot_arc[-1] / inner.knot_arc[-1] == pytest.approx(4.8 / 3.2, rel=2e-3)
+    rng = np.random.default_rng(7)
+    where, radius = rng.uniform(0, np.pi / 2, 30000), rng.uniform(2.8, 5.2, 30000)
+
+    def bump(angle: Array) -> Array:
+        return 0.04 * np.exp(-(((angle - np.pi / 4) / 0.15) ** 2))
+
+    points = np.stack([radius * np.cos(where) - 4, radius * np.sin(where), bump(where)], axis=1)
+    for path in (inner, outer):
+        found = fit(path, corridor_points(points, path, (-1, 20), Corridor(0.12, 0.35)))
+        inner_part = slice(40, -40)
+        assert found.measured[inner_part].all()
+        at = np.arctan2(found.position[inner_part, 1], found.position[inner_part, 0] + 4)
+        np.testing.assert_allclose(found.position[inner_part, 2], bump(at), atol=1.5e-3)
+
+
+def turn(angle: Array) -> Trajectory:
+    """Left around (-4, 0) by the angles (N,)."""
+    n = len(angle)
+    position = np.stack([4 * np.cos(angle) - 4, 4 * np.sin(angle), np.full(n, 1.7)], axis=1)
+    quaternion = Rotation.from_rotvec(np.outer(angle, [0, 0, 1])).as_quat()[:, [3, 0, 1, 2]]
+    return Trajectory(np.arange(n) * 10_000_000, position, quaternion)

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from card.geometry import Trajectory, apply, inverse
 from card.recording.burst import Burst
 from card.recording.laz import write_burst
-from card.wheels.arc_height import Corridor, corridor_samples
+from card.wheels.arc_height import Corridor, corridor_points
 from card.wheels.contact_path import contact_path
 from card.wheels.samples import BurstFile, Lidar, collect_samples
 from card.wheels.static_points import StaticVoxels
@@ -52,7 +52,7 @@ def test_a_burst_that_is_cropped_keeps_its_own_end(tmp_path: Path, deskewed: boo
     arrays = {"origin": np.zeros(3), "voxel_size": np.float64(VOXEL_M)}
     arrays["ids"] = np.unique(np.floor(world / VOXEL_M).astype(np.int32), axis=0)
     corridor = Corridor(0.12, 0.35)
-    ((d, h),) = collect_samples(
+    (found,) = collect_samples(
         [BurstFile("lidar_front", t_ns, tmp_path / f"{t_ns}.laz")],
         {"lidar_front": Lidar(rig_from_lidar, corrections, deskewed)},
         path,
@@ -62,8 +62,9 @@ def test_a_burst_that_is_cropped_keeps_its_own_end(tmp_path: Path, deskewed: boo
         corridor,
         12.0,
     )
-    wanted_d, wanted_h = corridor_samples(world, contact, (0.0, 30.0), corridor)
-    assert len(wanted_d) == 200
+    wanted = corridor_points(world, contact, (0.0, 30.0), corridor)
+    assert len(wanted) == 200
     # Stored to 0.1 mm.
-    np.testing.assert_allclose(d, wanted_d, atol=2e-4)
-    np.testing.assert_allclose(h, wanted_h, atol=2e-4)
+    np.testing.assert_allclose(found.arc, wanted.arc, atol=2e-4)
+    np.testing.assert_allclose(found.sideways, wanted.sideways, atol=2e-4)
+    np.testing.assert_allclose(found.height, wanted.height, atol=2e-4)

@@ -1,7 +1,8 @@
 """Distance along a contact path and height over it, for points near the path."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +15,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Corridor:
-    """How far from the path a point may lie: sideways and in height, metres."""
+    """How far from the path a point may lie, metres: sideways, in height and beyond the end of a run."""
 
     half_width_m: float
     max_height_m: float
+    overhang_m: float = 0.0
 
 
 def project(points: Array, position: Array, rotation: Array, arc: Array) -> tuple[Array, Array, Array]:
@@ -43,29 +45,60 @@ def project(points: Array, position: Array, rotation: Array, arc: Array) -> tupl
     return d, local[:, 2], local[:, 0]
 
 
-def corridor_samples(
+@dataclass(frozen=True)
+class RoadPoints:
+    """Points in a wheel's corridor: arc length, offset to the right and height over the path, (Q,) metres.
+
+    run : (Q,) the run of the path that each point was taken for.
+    """
+
+    arc: Array
+    sideways: Array
+    height: Array
+    run: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.arc)
+
+    def part(self, chosen: Any) -> "RoadPoints":
+        """The points that an index or a mask (Q,) chooses."""
+        return RoadPoints(self.arc[chosen], self.sideways[chosen], self.height[chosen], self.run[chosen])
+
+    @classmethod
+    def joined(cls, pieces: Sequence["RoadPoints"]) -> "RoadPoints":
+        """All points of the pieces, in their order."""
+        if not pieces:
+            return cls(np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0, dtype=np.int64))
+        columns = ([getattr(piece, name) for piece in pieces] for name in cls.__dataclass_fields__)
+        return cls(*map(np.concatenate, columns))
+
+
+def corridor_points(
     points: Array, path: ContactPath, window: tuple[float, float], corridor: Corridor
-) -> tuple[Array, Array]:
-    """Arc lengths and heights (Q,), (Q,) of the points (P, 3) that lie in the corridor of one pass.
+) -> RoadPoints:
+    """The points (P, 3) in world that lie in the corridor of one pass.
 
     The pass is the piece of path with arc lengths in `window`, so that a street driven twice keeps its two
     passes apart. Runs forward and in reverse over the same ground each take the points.
     """
-    arcs, heights = [np.zeros(0)], [np.zeros(0)]
-    for first, last in _runs(path, window):
+    found = []
+    for run, first, last in _runs(path, window):
         piece = slice(first, last + 1)
         arc = path.knot_arc[piece]
         d, h, sideways = project(points, path.knot_position[piece], path.knot_rotation[piece], arc)
         inside = (np.abs(sideways) <= corridor.half_width_m) & (np.abs(h) <= corridor.max_height_m)
-        inside &= (d >= max(arc[0], window[0])) & (d <= min(arc[-1], window[1]))
-        arcs.append(d[inside])
-        heights.append(h[inside])
-    return np.concatenate(arcs), np.concatenate(heights)
+        # The footprint of a wheel that stands at the end of a run reaches beyond it.
+        low, high = path.ends(run)
+        inside &= (d >= max(low - corridor.overhang_m, window[0])) & (
+            d <= min(high + corridor.overhang_m, window[1])
+        )
+        found.append(RoadPoints(d, sideways, h, np.full(len(d), run)).part(inside))
+    return RoadPoints.joined(found)
 
 
-def _runs(path: ContactPath, window: tuple[float, float]) -> Iterator[tuple[int, int]]:
-    """First and last knot of each run of segments that touches the window."""
+def _runs(path: ContactPath, window: tuple[float, float]) -> Iterator[tuple[int, int, int]]:
+    """Each run of segments that touches the window, with its first and last knot in there."""
     touching = np.flatnonzero((path.knot_arc[1:] >= window[0]) & (path.knot_arc[:-1] <= window[1]))
     for run in np.unique(path.run[touching]):
         segments = touching[path.run[touching] == run]
-        yield int(segments[0]), int(segments[-1]) + 1
+        yield int(run), int(segments[0]), int(segments[-1]) + 1

@@ -22,7 +22,8 @@ class ContactPath:
         rotations world_from_rig (N, 3, 3).
     knots : (M,) indices of the poses that are at least one step apart; a standing car adds none.
     knot_arc : (M,) cumulative length d_i of the polyline through them, metres.
-    arc : (N,) arc length of every pose, by projection on that polyline.
+    arc : (N,) arc length of every pose, by projection on the segment it lies on; less than a step beyond an
+        end of a run it goes on.
     segment : (N,) number of the segment each pose lies on; segment i joins knots i and i + 1.
     run : (M - 1,) number of the run each segment belongs to: it grows where driving turns to reverse or back.
     """
@@ -52,9 +53,22 @@ class ContactPath:
         since = np.asarray(t_ns, dtype=np.int64) - self.t_ns[0]
         return np.interp(since, self.t_ns - self.t_ns[0], self.arc)
 
-    def elevation(self, arc: ArrayLike) -> Array:
-        """World z (...) in metres of the path itself at arc lengths (...)."""
-        return np.interp(np.asarray(arc), self.knot_arc, self.knot_position[:, 2])
+    def ends(self, run: int) -> tuple[float, float]:
+        """Arc lengths at which a run begins and ends, metres."""
+        first, last = self._knots(run)
+        return float(self.knot_arc[first]), float(self.knot_arc[last])
+
+    def elevation(self, arc: ArrayLike, run: int) -> Array:
+        """World z (...) in metres of a run of the path at arc lengths (...), straight on beyond its ends."""
+        first, last = self._knots(run)
+        d, z = np.asarray(arc, dtype=np.float64), self.knot_position[:, 2]
+        i = np.clip(np.searchsorted(self.knot_arc, d, side="right"), first + 1, last)
+        alpha = (d - self.knot_arc[i - 1]) / (self.knot_arc[i] - self.knot_arc[i - 1])
+        return (1 - alpha) * z[i - 1] + alpha * z[i]
+
+    def _knots(self, run: int) -> tuple[int, int]:
+        segments = np.flatnonzero(self.run == run)
+        return int(segments[0]), int(segments[-1]) + 1
 
     def surface(self, arc: ArrayLike, height: ArrayLike) -> Array:
         """Points (..., 3) in world at arc lengths (...) and heights (...) over the path, both metres.
@@ -87,7 +101,7 @@ def contact_path(trajectory: Trajectory, contact_rig: ArrayLike, min_step_m: flo
     run = _runs(forward, lengths)
     segment = np.searchsorted(knots, np.arange(len(position)), side="right") - 1
     segment = np.clip(segment, 0, max(len(knots) - 2, 0))
-    arc = _arc(position, knots, knot_arc, segment)
+    arc = _arc(position, knots, knot_arc, segment, run)
     return ContactPath(trajectory.t_ns, position, rotation, knots, knot_arc, arc, segment, run)
 
 
@@ -104,13 +118,15 @@ def _knots(position: Array, min_step_m: float) -> Indices:
     return np.array(kept, dtype=np.int64)
 
 
-def _arc(position: Array, knots: Indices, knot_arc: Array, segment: Indices) -> Array:
+def _arc(position: Array, knots: Indices, knot_arc: Array, segment: Indices, run: Indices) -> Array:
     if len(knots) == 1:
         return np.zeros(len(position))
     start = position[knots[segment]]
     step = position[knots[segment + 1]] - start
     alpha = np.einsum("ij,ij->i", step, position - start) / np.einsum("ij,ij->i", step, step)
-    return knot_arc[segment] + np.clip(alpha, 0.0, 1.0) * (knot_arc[segment + 1] - knot_arc[segment])
+    turns = np.concatenate([[True], run[1:] != run[:-1], [True]])
+    low, high = np.where(turns[segment], -1.0, 0.0), np.where(turns[segment + 1], 2.0, 1.0)
+    return knot_arc[segment] + np.clip(alpha, low, high) * (knot_arc[segment + 1] - knot_arc[segment])
 
 
 def _runs(forward: NDArray[np.bool_], lengths: Array) -> Indices:

@@ -26,7 +26,7 @@ from card.wheels.road_plane import RoadPlanes
 from card.wheels.samples import BurstFile, Lidar, collect_samples, moving_bursts
 from card.wheels.static_points import StaticVoxels
 from card.wheels.tables import excitation_document, frame_planes, plane_columns
-from card.wheels.wheel_fit import Excitation, GapSettings, fit_excitation
+from card.wheels.wheel_fit import Excitation, QualitySettings, fit_excitation
 
 WHEELS = ("fl", "fr", "rl", "rr")
 
@@ -75,20 +75,24 @@ def excite(
         list(paths.values()),
         StaticVoxels(read_arrays(static_voxels, "static_voxels")),
         settings["static_reach_voxels"],
-        Corridor(settings["corridor_half_width_m"], settings["max_height_m"]),
+        Corridor(
+            settings["corridor_half_width_m"],
+            settings["max_height_m"],
+            overhang_m=settings["footprint_m"] / 2 + settings["min_step_m"],
+        ),
         settings["arc_window_m"],
     )
     spline = SplineSettings(**{name: settings[name] for name in SplineSettings.__dataclass_fields__})
-    gaps = GapSettings(settings["gap_reach_m"], settings["gap_min_points"])
+    quality = QualitySettings(**{name: settings[name] for name in QualitySettings.__dataclass_fields__})
     wheels = {
-        name: fit_excitation(paths[name], arc, height, spline, gaps)
-        for name, (arc, height) in zip(WHEELS, samples, strict=True)
+        name: fit_excitation(paths[name], road, spline, quality, settings["footprint_m"])
+        for name, road in zip(WHEELS, samples, strict=True)
     }
 
     table = read_table(frames, "frames")
     t_ns = np.asarray(table["t_ns"], dtype=np.int64)
-    planes, beside_gap = frame_planes(wheels, path, t_ns)
-    valid = ~beside_gap & (planes.residual_m <= settings["max_plane_residual_m"])
+    planes, measured = frame_planes(wheels, path, t_ns)
+    valid = measured & (planes.residual_m <= settings["max_plane_residual_m"])
 
     write_json(wheel_excitation, excitation_document(wheels, path), "wheel_excitation")
     write_table(road_planes, plane_columns(np.asarray(table["frame"]), t_ns, planes, valid), "road_planes")
@@ -108,7 +112,7 @@ def excite(
             "bursts": len(files),
             "samples": len(path.t_ns),
             "frames": len(t_ns),
-            **{f"points_{name}": len(arc) for name, (arc, _) in zip(WHEELS, samples, strict=True)},
+            **{f"points_{name}": len(road) for name, road in zip(WHEELS, samples, strict=True)},
         },
         figures=_figures(wheels, planes, valid),
         gates=gates,
@@ -135,11 +139,18 @@ def _lidars(bundle: Mapping[str, Any], description: Mapping[str, Any]) -> dict[s
 
 def _figures(wheels: Mapping[str, Excitation], planes: RoadPlanes, valid: NDArray[np.bool_]) -> list[Figure]:
     gap = np.concatenate([wheel.gap for wheel in wheels.values()])
-    residual = np.concatenate([wheel.residual_m[~wheel.gap] for wheel in wheels.values()])
-    points = np.concatenate([wheel.points[~wheel.gap] for wheel in wheels.values()])
+    uncertain = np.concatenate([wheel.uncertain & ~wheel.gap for wheel in wheels.values()])
+    points, residual, std = (
+        np.concatenate([getattr(wheel, name)[wheel.measured] for wheel in wheels.values()])
+        for name in ("points", "residual_m", "std_m")
+    )
     return [
         Figure("gap_pct", 100 * float(gap.mean()), "%", "samples with too few LiDAR points near"),
-        Figure("points_near", _median(points), "1", "median number of points near a sample that is no gap"),
+        Figure(
+            "uncertain_pct", 100 * float(uncertain.mean()), "%", "other samples whose points say too little"
+        ),
+        Figure("points_near", _median(points), "1", "median number of points near a measured sample"),
+        Figure("std_mm", _median(1e3 * std), "mm", "median standard deviation of a measured sample"),
         Figure(
             "residual_mm", _median(1e3 * residual), "mm", "median rms distance of the points from the spline"
         ),

@@ -4,115 +4,126 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import solveh_banded
+
+from card.wheels.normal_equations import NormalEquations, uniform_basis
 
 Array = NDArray[np.float64]
-#: Keeps a piece of spline that no point touches solvable; far below what a single point weighs.
-RIDGE = 1e-9
 MAX_ITERATIONS = 100
 CONVERGED_M = 1e-7
+#: Gauss points along a footprint; a piece of spline between knots is of third degree.
+FOOTPRINT_POINTS = 6
 
 
 @dataclass(frozen=True)
 class SplineSettings:
     """Settings of the fit; see ``settings/wheels``."""
 
+    corridor_half_width_m: float
     knot_spacing_m: float
     tukey_m: float
     tukey_start_m: float
     anneal_factor: float
     penalty: float
     penalty_anneal_power: float
+    tilt_penalty: float
 
 
 @dataclass(frozen=True)
 class Profile:
-    """A uniform cubic B-spline: knots from `start_m` every `spacing_m`, coefficients (K,) in metres."""
+    """Uniform cubic B-splines with knots from `start_m` every `spacing_m`.
+
+    coefficients : (K, 2) metres: of the elevation in the middle of the corridor, which is its mean over a
+        symmetric footprint, and of what is added at the corridor's right edge and taken off at its left one.
+    variance : (K, 4) of the elevation's coefficients, 1 over the weight of the points: (k, b) is the
+        covariance of coefficients k and k + b, for points of unit variance.
+    """
 
     start_m: float
     spacing_m: float
     coefficients: Array
+    variance: Array
 
     def at(self, arc: ArrayLike) -> Array:
-        """Heights (...) in metres at arc lengths (...)."""
+        """Elevations (...) in metres at arc lengths (...), in the middle of the corridor."""
+        return self._value(arc, 0)
+
+    def tilt_at(self, arc: ArrayLike) -> Array:
+        """What the right edge of the corridor is higher than its middle (...), metres."""
+        return self._value(arc, 1)
+
+    def under(self, arc: ArrayLike, length_m: float) -> Array:
+        """Mean elevations (...) over a footprint of this length around arc lengths (...)."""
+        centre = np.asarray(arc, dtype=np.float64)
+        total = np.zeros(centre.shape)
+        for point, weight in zip(*np.polynomial.legendre.leggauss(FOOTPRINT_POINTS), strict=True):
+            total += weight / 2 * self.at(centre + length_m / 2 * point)
+        return total
+
+    def std_under(self, arc: ArrayLike, length_m: float) -> Array:
+        """Greatest standard deviation (...) of the elevation under a footprint if that of a point is 1."""
+        centre = np.asarray(arc, dtype=np.float64)
+        return np.max([self._std(centre + length_m * share) for share in (-0.5, 0.0, 0.5)], axis=0)
+
+    def _std(self, arc: Array) -> Array:
         first, basis = uniform_basis(arc, self.start_m, self.spacing_m, len(self.coefficients))
-        return np.einsum("...k,...k->...", basis, self.coefficients[first[..., None] + np.arange(4)])
+        total = np.zeros(first.shape)
+        for a in range(4):
+            for b in range(a, 4):
+                share = basis[..., a] * basis[..., b] * self.variance[first + a, b - a]
+                total += share if a == b else 2 * share
+        return np.sqrt(np.maximum(total, 0.0))
 
-
-def uniform_basis(
-    arc: ArrayLike, start_m: float, spacing_m: float, count: int
-) -> tuple[NDArray[np.int64], Array]:
-    """First coefficient (...) and values (..., 4) of the four cubic B-splines alive at each arc length."""
-    position = (np.asarray(arc, dtype=np.float64) - start_m) / spacing_m
-    first = np.clip(np.floor(position).astype(np.int64), 0, count - 4)
-    u = position - first
-    v = 1 - u
-    basis = np.stack([v**3, 3 * u**3 - 6 * u**2 + 4, 3 * v**3 - 6 * v**2 + 4, u**3], axis=-1) / 6
-    return first, basis
+    def _value(self, arc: ArrayLike, column: int) -> Array:
+        first, basis = uniform_basis(arc, self.start_m, self.spacing_m, len(self.coefficients))
+        return np.einsum("...k,...k->...", basis, self.coefficients[first[..., None] + np.arange(4), column])
 
 
 def tukey_weights(residual: Array, scale: float) -> Array:
     """Tukey's biweight (N,) of residuals (N,): (1 - (r / scale)^2)^2 inside the scale, else 0."""
-    return np.maximum(0.0, 1 - np.square(residual / scale)) ** 2
+    inside = np.maximum(0.0, 1 - (residual / scale) * (residual / scale))
+    return inside * inside
 
 
 def fit_profile(
-    arc: Array, height: Array, settings: SplineSettings, guess: Array | None = None
-) -> tuple[Profile, Array]:
-    """The spline through points (N,), N >= 1, and the Tukey weight (N,) each point ends with.
+    arc: Array,
+    sideways: Array,
+    height: Array,
+    settings: SplineSettings,
+    guess: Array | None = None,
+    compiled: bool = True,
+) -> tuple[Profile, Array, Array]:
+    """The splines through points (N,), N >= 1, the residual (N,) and the Tukey weight (N,) of each point.
 
-    `guess` (N,) is about how high the road is at each point, metres; 0 if not given.
+    arc : (N,) in increasing order. sideways : (N,) offset to the right of the path. height : (N,). `guess`
+    (N,) is about how high the road is at each point, 0 if not given. All in metres. compiled : whether the
+    sums over the points are taken in machine code; the plain form gives the same bits.
 
     Minimises the sum of Tukey's loss over the heights plus the penalty times the squared second differences
     of the coefficients, by reweighted least squares (supplement, "Wheel Excitation"). The loss is annealed
     from wide to narrow, because from a bad start the narrow one locks on to an outlier cluster, and the
     spline is stiffer while the loss is wide, so that a cluster is outvoted by the road before and behind it.
+
+    The height may also tilt across the corridor, with a penalty of its own: over the edge of a pothole that
+    the tyre meets with one side, a loss without it takes one of two levels and drops the other.
     """
     spacing = settings.knot_spacing_m
     # One interval more at each end, where the penalty alone continues the spline.
     start = float(arc.min()) - spacing
     count = int(np.ceil((float(arc.max()) - start) / spacing)) + 4
-    first, basis = uniform_basis(arc, start, spacing, count)
-    coefficients = np.zeros(count)
+    across = sideways / settings.corridor_half_width_m
+    equations = NormalEquations(arc, across, height, start, spacing, count, compiled)
+    coefficients = np.zeros((count, 2))
     scale = settings.tukey_start_m
-    fitted = np.zeros(len(arc)) if guess is None else guess
+    residual = height - (0.0 if guess is None else guess)
     for _ in range(MAX_ITERATIONS):
-        weights = tukey_weights(height - fitted, scale)
         stiffness = (scale / settings.tukey_m) ** settings.penalty_anneal_power
-        solution = _solve(first, basis, height, weights, _penalty_band(count, settings.penalty * stiffness))
+        equations.weigh(tukey_weights(residual, scale))
+        solution = equations.solve(stiffness * settings.penalty, stiffness * settings.tilt_penalty)
         step = float(np.abs(solution - coefficients).max())
-        coefficients, fitted = solution, _evaluate(first, basis, solution)
+        coefficients, residual = solution, equations.residual(solution)
         if scale == settings.tukey_m and step < CONVERGED_M:
             break
         scale = max(scale * settings.anneal_factor, settings.tukey_m)
-    return Profile(start, spacing, coefficients), tukey_weights(height - fitted, settings.tukey_m)
-
-
-def _evaluate(first: NDArray[np.int64], basis: Array, coefficients: Array) -> Array:
-    value = basis[:, 0] * coefficients[first]
-    for k in range(1, 4):
-        value += basis[:, k] * coefficients[first + k]
-    return value
-
-
-def _solve(first: NDArray[np.int64], basis: Array, height: Array, weights: Array, band: Array) -> Array:
-    """Coefficients (K,) of the normal equations, added to the lower `band` (4, K) of the penalty."""
-    count = band.shape[1]
-    right = np.zeros(count)
-    for a in range(4):
-        weighted = weights * basis[:, a]
-        right += np.bincount(first + a, weighted * height, minlength=count)
-        for b in range(a, 4):
-            band[b - a] += np.bincount(first + a, weighted * basis[:, b], minlength=count)
-    return solveh_banded(band, right, lower=True, overwrite_ab=True, overwrite_b=True)
-
-
-def _penalty_band(count: int, penalty: float) -> Array:
-    """Lower band (4, K) of penalty * D^T D with D the second differences, plus the ridge."""
-    band = np.zeros((4, count))
-    difference = (1.0, -2.0, 1.0)
-    for a in range(3):
-        for b in range(a, 3):
-            band[b - a, a : a + count - 2] += penalty * difference[a] * difference[b]
-    band[0] += RIDGE
-    return band
+    variance = equations.variance(settings.penalty, settings.tilt_penalty)
+    profile = Profile(start, spacing, coefficients, variance)
+    return profile, residual, tukey_weights(residual, settings.tukey_m)

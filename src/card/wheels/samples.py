@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from card.estimation.deskew import deskew_burst
 from card.geometry import Trajectory
 from card.recording.laz import read_burst
-from card.wheels.arc_height import Corridor, corridor_samples
+from card.wheels.arc_height import Corridor, RoadPoints, corridor_points
 from card.wheels.contact_path import ContactPath
 from card.wheels.crop import crop_burst
 from card.wheels.static_points import StaticVoxels
@@ -61,20 +61,18 @@ def collect_samples(
     static_reach: int,
     corridor: Corridor,
     arc_window_m: float,
-) -> list[tuple[Array, Array]]:
-    """Arc lengths and heights (Q,), (Q,) in metres of each wheel's corridor points.
+) -> list[RoadPoints]:
+    """Each wheel's corridor points.
 
     A burst only serves the pass it was taken on: path within `arc_window_m` of where the wheel then was.
     """
-    pieces: list[list[tuple[Array, Array]]] = [[(np.zeros(0), np.zeros(0))] for _ in paths]
+    pieces: list[list[RoadPoints]] = [[] for _ in paths]
     for points, windows in _static_points(
         bursts, lidars, trajectory, paths, static, static_reach, arc_window_m
     ):
         for piece, path, window in zip(pieces, paths, windows, strict=True):
-            piece.append(corridor_samples(points, path, window, corridor))
-    return [
-        (np.concatenate([d for d, _ in piece]), np.concatenate([h for _, h in piece])) for piece in pieces
-    ]
+            piece.append(corridor_points(points, path, window, corridor))
+    return [RoadPoints.joined(piece) for piece in pieces]
 
 
 def _static_points(

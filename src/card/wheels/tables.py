@@ -28,7 +28,9 @@ def excitation_document(wheels: Mapping[str, Excitation], trajectory: Trajectory
                 None if np.isnan(value) else round(value, POSITION_DECIMALS)
                 for value in wheel.residual_m.tolist()
             ],
+            "std_m": np.round(wheel.std_m, POSITION_DECIMALS).tolist(),
             "gap": wheel.gap.tolist(),
+            "uncertain": wheel.uncertain.tolist(),
         }
     return {"schema": "wheel_excitation", "wheels": document}
 
@@ -36,12 +38,12 @@ def excitation_document(wheels: Mapping[str, Excitation], trajectory: Trajectory
 def frame_planes(
     wheels: Mapping[str, Excitation], trajectory: Trajectory, t_ns: NDArray[np.int64]
 ) -> tuple[RoadPlanes, NDArray[np.bool_]]:
-    """The road planes at frame times (F,) and whether any contact then is in a gap (F,)."""
+    """The road planes at frame times (F,) and whether all contacts then are measured (F,)."""
     found = [wheel.at(t_ns) for wheel in wheels.values()]
     rig_from_world = inverse(trajectory.at(t_ns))
     contacts = np.stack([apply(rig_from_world, position) for position, _ in found], axis=1)
-    gap = np.any([gap for _, gap in found], axis=0)
-    return fit_road_planes(contacts), gap
+    measured = np.all([measured for _, measured in found], axis=0)
+    return fit_road_planes(contacts), measured
 
 
 def plane_columns(

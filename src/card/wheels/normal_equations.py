@@ -1,0 +1,132 @@
+"""Normal equations of the two splines of a profile: banded, summed up interval by interval."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import cholesky_banded, solveh_banded
+
+from card.wheels import spline_kernels
+
+Array = NDArray[np.float64]
+#: Keeps a piece of spline that no point touches solvable; far below what a single point weighs.
+RIDGE = 1e-9
+#: Elevation and tilt of one place are neighbours among the unknowns: four places make eight diagonals.
+BAND = 8
+
+
+def uniform_basis(
+    arc: ArrayLike, start_m: float, spacing_m: float, count: int
+) -> tuple[NDArray[np.int64], Array]:
+    """First coefficient (...) and values (..., 4) of the four cubic B-splines alive at each arc length."""
+    position = (np.asarray(arc, dtype=np.float64) - start_m) / spacing_m
+    first = np.clip(np.floor(position).astype(np.int64), 0, count - 4)
+    u = position - first
+    v = 1 - u
+    basis = np.stack([v**3, 3 * u**3 - 6 * u**2 + 4, 3 * v**3 - 6 * v**2 + 4, u**3], axis=-1) / 6
+    return first, basis
+
+
+class NormalEquations:
+    """Weighted least squares of heights (N,) over splines of `count` coefficients in elevation and tilt.
+
+    The unknowns are ordered elevation 0, tilt 0, elevation 1, tilt 1 and so on. across : (N,) where a point
+    lies in the corridor, from -1 at its left edge to 1 at its right one.
+    """
+
+    def __init__(
+        self,
+        arc: Array,
+        across: Array,
+        height: Array,
+        start_m: float,
+        spacing_m: float,
+        count: int,
+        compiled: bool,
+    ) -> None:
+        self._first, self._basis = uniform_basis(arc, start_m, spacing_m, count)
+        self._across, self._height, self._count = across, height, count
+        self._kernels = spline_kernels if compiled else PlainKernels
+        self._products = np.zeros((3, 10, count - 3))
+        self._right = np.zeros((2, 4, count - 3))
+
+    def weigh(self, weights: Array) -> None:
+        """Sum up the points with these weights (N,)."""
+        points = (self._first, self._basis, self._across, self._height, weights)
+        self._products, self._right = self._kernels.sums(*points, self._count - 3)
+
+    def residual(self, coefficients: Array) -> Array:
+        """Heights (N,) over the splines of coefficients (K, 2)."""
+        found: Array = self._kernels.residual(
+            self._first, self._basis, self._across, self._height, coefficients
+        )
+        return found
+
+    def solve(self, penalty: float, tilt_penalty: float) -> Array:
+        """Coefficients (K, 2)."""
+        right = np.zeros((self._count, 2))
+        for m in range(2):
+            for a in range(4):
+                right[a : a + self._count - 3, m] += self._right[m, a]
+        band = self._band(penalty, tilt_penalty)
+        solution = solveh_banded(band, right.ravel(), lower=True, overwrite_ab=True, overwrite_b=True)
+        return np.asarray(solution, dtype=np.float64).reshape(self._count, 2)
+
+    def variance(self, penalty: float, tilt_penalty: float) -> Array:
+        """Covariances (K, 4) of the elevation's coefficients with themselves and the next three."""
+        factor = cholesky_banded(self._band(penalty, tilt_penalty), lower=True, overwrite_ab=True)
+        return np.ascontiguousarray(spline_kernels.banded_inverse(factor)[::2, ::2])
+
+    def _band(self, penalty: float, tilt_penalty: float) -> Array:
+        """Lower band (8, 2 K) of the sums, the penalties and the ridge."""
+        count, pieces = self._count, self._count - 3
+        band = np.zeros((BAND, count, 2))
+        pair = 0
+        for a in range(4):
+            for b in range(a, 4):
+                low, offset = slice(a, a + pieces), 2 * (b - a)
+                band[offset, low, 0] += self._products[0, pair]
+                band[offset + 1, low, 0] += self._products[1, pair]
+                if b > a:
+                    band[offset - 1, low, 1] += self._products[1, pair]
+                band[offset, low, 1] += self._products[2, pair]
+                pair += 1
+        difference = (1.0, -2.0, 1.0)
+        for a in range(3):
+            for b in range(a, 3):
+                band[2 * (b - a), a : a + count - 2, 0] += penalty * difference[a] * difference[b]
+        band[0, :, 1] += tilt_penalty
+        band[0] += RIDGE
+        return band.reshape(BAND, 2 * count)
+
+
+class PlainKernels:
+    """The sums of `spline_kernels` in numpy, in the same order: what the compiled form is held to."""
+
+    @staticmethod
+    def residual(
+        first: NDArray[np.int64], basis: Array, across: Array, height: Array, coefficients: Array
+    ) -> Array:
+        """See `spline_kernels.residual`."""
+        value = np.zeros(len(first))
+        for k in range(4):
+            here = coefficients[first + k]
+            value += basis[:, k] * (here[:, 0] + across * here[:, 1])
+        return height - value
+
+    @staticmethod
+    def sums(
+        first: NDArray[np.int64], basis: Array, across: Array, height: Array, weights: Array, pieces: int
+    ) -> tuple[Array, Array]:
+        """See `spline_kernels.sums`."""
+        products, right = np.zeros((3, 10, pieces)), np.zeros((2, 4, pieces))
+        pair = 0
+        for a in range(4):
+            weighted = weights * basis[:, a]
+            right[0, a] = np.bincount(first, weighted * height, minlength=pieces)
+            right[1, a] = np.bincount(first, weighted * across * height, minlength=pieces)
+            for b in range(a, 4):
+                both = weighted * basis[:, b]
+                for m in range(3):
+                    products[m, pair] = np.bincount(first, both, minlength=pieces)
+                    both = both * across
+                pair += 1
+        return products, right
