@@ -1,66 +1,112 @@
-"""Wheel excitation against the simulated road: the mean surface under each tyre's footprint."""
+"""Wheel excitation against the simulated road, with estimated and with true poses, and against Ceres."""
 
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from wheel_errors import WheelErrors, wheel_errors
+from wheel_inputs import excite_with
 
-from card.artifacts import read_json, read_table
-from card.geometry import Trajectory, apply, inverse
+from card.artifacts import read_json
 
-WHEELS = ("fl", "fr", "rl", "rr")
-RMS_AIM_MM, MAX_AIM_MM = 1.0, 5.0
+RMS_AIM_MM, MAX_AIM_MM, TRUE_POSES_AIM_MM, CERES_AIM_UM = 1.0, 5.0, 0.6, 10.0
 
 
 def rows(work: Path, truth: Path, sequences: Sequence[str]) -> list[dict[str, Any]]:
-    """Rms and worst height error over all samples of all sequences that are no gap, and the share of gaps.
+    """Figures over all samples of all sequences.
 
-    work : folder with ``results/<id>/`` of wheels and poses; truth : with ``<id>/wheels.parquet`` and
-    ``<id>/trajectory.parquet``.
+    `rms_mm` and `max_mm` are of the measured samples that do not cross a wall; those that do have rows of
+    their own, and so has what is flagged. `rms_true_poses_mm` is the same rms with the true poses and
+    calibration.
+
+    work : folder with ``results/<id>/`` of wheels and poses; truth : with ``<id>/wheels.parquet``,
+    ``<id>/trajectory.parquet``, ``<id>/world.npz`` and ``sessions/``.
     """
-    errors, gaps = [np.zeros(0)], [np.zeros(0, dtype=bool)]
-    for sequence in sequences:
-        if (work / "results" / sequence / "wheel_excitation.json").is_file() and (truth / sequence).is_dir():
-            error, gap = height_errors_mm(work / "results" / sequence, truth / sequence)
-            errors.append(error[~gap])
-            gaps.append(gap)
-    error, gap = np.concatenate(errors), np.concatenate(gaps)
-    figures = [
-        ("rms_mm", float(np.sqrt(np.mean(error**2))) if error.size else None, "mm", RMS_AIM_MM),
-        ("max_mm", float(np.abs(error).max()) if error.size else None, "mm", MAX_AIM_MM),
-        ("gap_pct", 100 * float(gap.mean()) if gap.size else None, "%", None),
+    done = [
+        sequence
+        for sequence in sequences
+        if (work / "results" / sequence / "wheel_excitation.json").is_file()
+        and (truth / sequence / "wheels.parquet").is_file()
     ]
-    return [
-        {"stage": "wheels", "figure": figure, "value": value, "unit": unit, "aim": aim, "better": "lower"}
-        for figure, value, unit, aim in figures
-    ]
+    if not done:
+        return [_row(name, None, unit, aim) for name, unit, aim in FIGURES]
+    found, true = [], []
+    for sequence in done:
+        results = work / "results" / sequence
+        paths = results / "wheel_excitation.json", results / "trajectory.parquet"
+        found.append(wheel_errors(*paths, truth / sequence))
+        true.append(_with_true_poses(work, truth, sequence))
+    values = {
+        **figures(WheelErrors.joined(found)),
+        "rms_true_poses_mm": figures(WheelErrors.joined(true))["rms_mm"],
+    }
+    values["ceres_max_um"] = ceres_max_um()
+    return [_row(name, values[name], unit, aim) for name, unit, aim in FIGURES]
 
 
-def height_errors_mm(results: Path, truth: Path) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Errors (S,) along the rig's z of all wheels' contacts, each in its own trajectory's rig, and gaps (S,).
+FIGURES = (
+    ("rms_mm", "mm", RMS_AIM_MM),
+    ("max_mm", "mm", MAX_AIM_MM),
+    ("walls_rms_mm", "mm", None),
+    ("walls_max_mm", "mm", None),
+    ("walls_pct", "%", None),
+    ("gap_pct", "%", None),
+    ("uncertain_pct", "%", None),
+    ("rms_true_poses_mm", "mm", TRUE_POSES_AIM_MM),
+    ("ceres_max_um", "um", CERES_AIM_UM),
+)
 
-    In rig, because that is what the excitation is for: the road under the sensors. Drift of the whole
-    trajectory is a figure of the poses.
-    """
-    wheels = read_json(results / "wheel_excitation.json", "wheel_excitation")["wheels"]
-    found_path, true_path = (
-        Trajectory.from_table(read_table(folder / "trajectory.parquet", "trajectory"))
-        for folder in (results, truth)
-    )
-    table = read_table(truth / "wheels.parquet", "truth_wheels")
-    column = {name: np.asarray(table[name]) for name in ("wheel", "t_ns", "x", "y", "z")}
-    errors, gaps = [], []
-    for wheel in WHEELS:
-        of_wheel = column["wheel"] == wheel
-        true_t = column["t_ns"][of_wheel]
-        true = np.stack([column[axis][of_wheel] for axis in "xyz"], axis=1)
-        t_ns = np.array([row[0] for row in wheels[wheel]["samples"]], dtype=np.int64)
-        found = np.array([row[1:4] for row in wheels[wheel]["samples"]])
-        _, ours, theirs = np.intersect1d(t_ns, true_t, assume_unique=True, return_indices=True)
-        height = apply(inverse(found_path.at(t_ns[ours])), found[ours])[:, 2]
-        true_height = apply(inverse(true_path.at(true_t[theirs])), true[theirs])[:, 2]
-        errors.append(1e3 * (height - true_height))
-        gaps.append(np.array(wheels[wheel]["gap"])[ours])
-    return np.concatenate(errors), np.concatenate(gaps)
+
+def figures(errors: WheelErrors) -> dict[str, float | None]:
+    """Rms and worst height error of measured samples, off walls and across them, and shares of the rest."""
+    off, across = (errors.height_mm[errors.measured & (errors.wall == wall)] for wall in (False, True))
+    return {
+        "rms_mm": _rms(off),
+        "max_mm": _worst(off),
+        "walls_rms_mm": _rms(across),
+        "walls_max_mm": _worst(across),
+        "walls_pct": 100 * float((errors.measured & errors.wall).mean()),
+        "gap_pct": 100 * float(errors.gap.mean()),
+        "uncertain_pct": 100 * float((errors.uncertain & ~errors.gap).mean()),
+    }
+
+
+def ceres_max_um() -> float | None:
+    """Greatest difference to Ceres of the coefficients over 500 m of a wheel; None without it."""
+    try:
+        from ceres_reference import difference_um
+    except ImportError:
+        return None
+    return difference_um(500.0)
+
+
+def _with_true_poses(work: Path, truth: Path, sequence: str) -> WheelErrors:
+    results = work / "results" / sequence
+    recording = results / "recording"
+    if not recording.is_dir():
+        recording = work / "recordings" / sequence
+    session = read_json(results / "calibration.json", "calibration")["session"]["id"]
+    with tempfile.TemporaryDirectory(prefix="card-wheels-") as scratch:
+        excitation = excite_with(
+            Path(scratch),
+            recording,
+            results / "bursts.parquet",
+            results / "frames.parquet",
+            truth / "sessions" / session / "calibration.json",
+            truth / sequence / "trajectory.parquet",
+        )
+        return wheel_errors(excitation, truth / sequence / "trajectory.parquet", truth / sequence)
+
+
+def _rms(values: Any) -> float | None:
+    return float(np.sqrt(np.mean(values**2))) if len(values) else None
+
+
+def _worst(values: Any) -> float | None:
+    return float(np.abs(values).max()) if len(values) else None
+
+
+def _row(figure: str, value: float | None, unit: str, aim: float | None) -> dict[str, Any]:
+    return {"stage": "wheels", "figure": figure, "value": value, "unit": unit, "aim": aim, "better": "lower"}
