@@ -123,7 +123,9 @@ def write_frames(folder: Path, t_ns: NDArray[np.int64]) -> None:
     write_table(folder / "frames.parquet", frames, "frames")
 
 
-def run(folder: Path, out: Path, **changes: Any) -> tuple[dict[str, Any], Any, dict[str, Any]]:
+def run(
+    folder: Path, out: Path, threads: int = 1, **changes: Any
+) -> tuple[dict[str, Any], Any, dict[str, Any]]:
     inputs = {n: folder / f"{n}.parquet" for n in ("bursts", "frames", "trajectory")}
     inputs |= {"calibration": folder / "calibration.json", "static_voxels": folder / "static_voxels.npz"}
     excite(
@@ -134,6 +136,7 @@ def run(folder: Path, out: Path, **changes: Any) -> tuple[dict[str, Any], Any, d
         report=out / "wheels.report.json",
         settings=default_settings("wheels"),
         gates=[],
+        threads=threads,
     )
     return (
         read_json(out / "wheel_excitation.json", "wheel_excitation")["wheels"],
@@ -296,8 +299,8 @@ def test_inputs_that_do_not_fit_are_refused(
     assert not (tmp_path / "wheel_excitation.json").exists()
 
 
-def test_same_input_same_bytes(drive: Path, result: Any, tmp_path: Path) -> None:
-    again = run(drive, tmp_path)
+def test_same_input_same_bytes_on_any_number_of_processes(drive: Path, result: Any, tmp_path: Path) -> None:
+    again = run(drive, tmp_path, threads=2)
     assert again[0] == result[0]
     assert again[1].equals(result[1])
     assert again[2] == result[2]

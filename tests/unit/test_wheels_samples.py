@@ -11,7 +11,7 @@ from card.recording.burst import Burst
 from card.recording.laz import write_burst
 from card.wheels.arc_height import Corridor, corridor_points
 from card.wheels.contact_path import contact_path
-from card.wheels.samples import BurstFile, Lidar, collect_samples
+from card.wheels.samples import BurstFile, Cutter, Lidar, collect_samples
 from card.wheels.static_points import StaticVoxels
 
 START_NS = 1_776_153_600_000_000_000
@@ -52,8 +52,7 @@ def test_a_burst_that_is_cropped_keeps_its_own_end(tmp_path: Path, deskewed: boo
     arrays = {"origin": np.zeros(3), "voxel_size": np.float64(VOXEL_M)}
     arrays["ids"] = np.unique(np.floor(world / VOXEL_M).astype(np.int32), axis=0)
     corridor = Corridor(0.12, 0.35)
-    (found,) = collect_samples(
-        [BurstFile("lidar_front", t_ns, tmp_path / f"{t_ns}.laz")],
+    cutter = Cutter(
         {"lidar_front": Lidar(rig_from_lidar, corrections, deskewed)},
         path,
         [contact],
@@ -62,6 +61,8 @@ def test_a_burst_that_is_cropped_keeps_its_own_end(tmp_path: Path, deskewed: boo
         corridor,
         12.0,
     )
+    burst = BurstFile("lidar_front", t_ns, tmp_path / f"{t_ns}.laz")
+    (found,) = collect_samples([burst], cutter, threads=1)
     wanted = corridor_points(world, contact, (0.0, 30.0), corridor)
     assert len(wanted) == 200
     # Stored to 0.1 mm.

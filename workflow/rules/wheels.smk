@@ -16,6 +16,7 @@ rule wheels:
         report="results/{id}/wheels.report.json",
     log:
         "logs/{id}/wheels.log",
+    threads: 2
     params:
         cfg=cfg("wheels"),
         code=code("wheels"),

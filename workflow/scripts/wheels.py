@@ -18,4 +18,5 @@ with logged(Path(snakemake.log[0])):
         report=Path(snakemake.output.report),
         settings=snakemake.params.cfg["settings"],
         gates=snakemake.params.cfg["gates"],
+        threads=snakemake.threads,
     )

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from card.artifacts import (
     Figure,
-    progress,
     read_arrays,
     read_json,
     read_table,
@@ -23,7 +22,7 @@ from card.wheels.arc_height import Corridor
 from card.wheels.contact_path import contact_path
 from card.wheels.profile import SplineSettings
 from card.wheels.road_plane import RoadPlanes
-from card.wheels.samples import BurstFile, Lidar, collect_samples, moving_bursts
+from card.wheels.samples import BurstFile, Cutter, Lidar, collect_samples, moving_bursts
 from card.wheels.static_points import StaticVoxels
 from card.wheels.tables import excitation_document, frame_planes, plane_columns
 from card.wheels.wheel_fit import Excitation, QualitySettings, fit_excitation
@@ -44,6 +43,7 @@ def excite(
     report: Path,
     settings: Mapping[str, Any],
     gates: Sequence[Mapping[str, Any]],
+    threads: int,
 ) -> None:
     """Fit the road under each wheel and write the excitation and the road planes of a sequence.
 
@@ -54,6 +54,7 @@ def excite(
     recording : folder with the bursts.
     bursts, frames, calibration, trajectory, static_voxels : artifacts of the schemas of these names.
     wheel_excitation, road_planes, report : the files to write.
+    threads : processes that cut the corridors out of the bursts; the bytes do not depend on it.
 
     Raises
     ------
@@ -68,8 +69,7 @@ def excite(
     }
     description = read_description(recording)
     files = moving_bursts(_burst_files(bursts, recording), paths["fl"], settings["min_step_m"])
-    samples = collect_samples(
-        progress(files, "wheels"),
+    cutter = Cutter(
         _lidars(bundle, description),
         path,
         list(paths.values()),
@@ -82,6 +82,7 @@ def excite(
         ),
         settings["arc_window_m"],
     )
+    samples = collect_samples(files, cutter, threads)
     spline = SplineSettings(**{name: settings[name] for name in SplineSettings.__dataclass_fields__})
     quality = QualitySettings(**{name: settings[name] for name in QualitySettings.__dataclass_fields__})
     wheels = {

@@ -1,13 +1,16 @@
 """Road points under each wheel, streamed out of the bursts."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from card.artifacts import progress
 from card.estimation.deskew import deskew_burst
 from card.geometry import Trajectory
 from card.recording.laz import read_burst
@@ -17,6 +20,8 @@ from card.wheels.crop import crop_burst
 from card.wheels.static_points import StaticVoxels
 
 Array = NDArray[np.float64]
+#: Bursts that a process takes at a time.
+BURSTS_AT_ONCE = 40
 
 
 @dataclass(frozen=True)
@@ -52,55 +57,73 @@ def moving_bursts(bursts: Iterable[BurstFile], path: ContactPath, min_step_m: fl
     return kept
 
 
-def collect_samples(
-    bursts: Iterable[BurstFile],
-    lidars: Mapping[str, Lidar],
-    trajectory: Trajectory,
-    paths: Sequence[ContactPath],
-    static: StaticVoxels,
-    static_reach: int,
-    corridor: Corridor,
-    arc_window_m: float,
-) -> list[RoadPoints]:
-    """Each wheel's corridor points.
+@dataclass(frozen=True)
+class Cutter:
+    """Cuts the wheels' corridors out of bursts.
 
     A burst only serves the pass it was taken on: path within `arc_window_m` of where the wheel then was.
     """
-    pieces: list[list[RoadPoints]] = [[] for _ in paths]
-    for points, windows in _static_points(
-        bursts, lidars, trajectory, paths, static, static_reach, arc_window_m
-    ):
-        for piece, path, window in zip(pieces, paths, windows, strict=True):
-            piece.append(corridor_points(points, path, window, corridor))
-    return [RoadPoints.joined(piece) for piece in pieces]
 
+    lidars: Mapping[str, Lidar]
+    trajectory: Trajectory
+    paths: Sequence[ContactPath]
+    static: StaticVoxels
+    static_reach: int
+    corridor: Corridor
+    arc_window_m: float
 
-def _static_points(
-    bursts: Iterable[BurstFile],
-    lidars: Mapping[str, Lidar],
-    trajectory: Trajectory,
-    paths: Sequence[ContactPath],
-    static: StaticVoxels,
-    static_reach: int,
-    arc_window_m: float,
-) -> Iterator[tuple[Array, list[tuple[float, float]]]]:
-    """World points (P, 3) of each burst near the paths and the static voxels, and the arc windows."""
-    for entry in bursts:
-        lidar = lidars[entry.lidar]
-        arcs = [float(path.arc_at(entry.t_start_ns)) for path in paths]
-        windows = [(arc - arc_window_m, arc + arc_window_m) for arc in arcs]
+    def cut(self, bursts: Iterable[BurstFile]) -> list[RoadPoints]:
+        """Each wheel's corridor points of the bursts."""
+        pieces: list[list[RoadPoints]] = [[] for _ in self.paths]
+        for entry in bursts:
+            arcs = [float(path.arc_at(entry.t_start_ns)) for path in self.paths]
+            windows = [(arc - self.arc_window_m, arc + self.arc_window_m) for arc in arcs]
+            points = self._static_points(entry, windows)
+            if len(points):
+                for piece, path, window in zip(pieces, self.paths, windows, strict=True):
+                    piece.append(corridor_points(points, path, window, self.corridor))
+        return [RoadPoints.joined(piece) for piece in pieces]
+
+    def _static_points(self, entry: BurstFile, windows: Sequence[tuple[float, float]]) -> Array:
+        """World points (P, 3) of a burst near the paths and the static voxels."""
+        lidar = self.lidars[entry.lidar]
         whole = read_burst(entry.file)
-        burst = crop_burst(whole, lidar.rig_from_lidar, trajectory, paths, windows)
+        burst = crop_burst(whole, lidar.rig_from_lidar, self.trajectory, self.paths, windows)
         if len(burst) == 0:
-            continue
+            return np.zeros((0, 3))
         points = deskew_burst(
             burst,
             lidar.rig_from_lidar,
-            trajectory,
+            self.trajectory,
             lidar.corrections,
             motion_compensate=not lidar.deskewed,
             end_ns=whole.end_ns,
         )
-        points = points[static.near(points, static_reach)]
-        if len(points):
-            yield points, windows
+        return points[self.static.near(points, self.static_reach)]
+
+
+def collect_samples(bursts: Sequence[BurstFile], cutter: Cutter, threads: int) -> list[RoadPoints]:
+    """Each wheel's corridor points of all bursts, in their order; `threads` processes share the bursts."""
+    blocks = [bursts[i : i + BURSTS_AT_ONCE] for i in range(0, len(bursts), BURSTS_AT_ONCE)]
+    found = list(progress(_cut(blocks, cutter, threads), "wheels", total=len(blocks)))
+    return [RoadPoints.joined([block[wheel] for block in found]) for wheel in range(len(cutter.paths))]
+
+
+# Set before the processes fork: they inherit it, nothing is pickled.
+_inherited: list[Cutter] = []
+
+
+def _cut(blocks: Sequence[Sequence[BurstFile]], cutter: Cutter, threads: int) -> Iterator[list[RoadPoints]]:
+    if threads < 2 or len(blocks) < 2:
+        yield from map(cutter.cut, blocks)
+        return
+    _inherited.append(cutter)
+    try:
+        with ProcessPoolExecutor(threads, mp_context=get_context("fork")) as pool:
+            yield from pool.map(_cut_block, blocks)
+    finally:
+        _inherited.pop()
+
+
+def _cut_block(block: Sequence[BurstFile]) -> list[RoadPoints]:
+    return _inherited[-1].cut(block)
