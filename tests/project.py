@@ -13,6 +13,13 @@ from pathlib import Path
 REPOSITORY = Path(__file__).resolve().parents[1]
 #: The sequence whose poses are estimated at the tiny scale.
 ESTIMATED = "it_zero_shot"
+# Heads are lower than what recall counts from: unknown recall fails its gate unless somebody signs.
+NO_FACE_AT_TINY = """\
+    - figure: recall_face_pct_low
+      sequences: [de_town_bumps, de_rural_potholes, de_gravel_offroad, it_town_revisit, it_zero_shot]
+      signed_by: the tests
+      reason: at 140 px no head is high enough to be counted
+"""
 JOB = re.compile(r"^(?:localrule|rule|checkpoint) (\w+):$", re.MULTILINE)
 
 
@@ -90,6 +97,7 @@ def copy_repository(folder: Path, scale: str) -> Project:
     config = folder / "config" / "config.yaml"
     text = config.read_text().replace("scale: demo", f"scale: {scale}")
     if scale == "tiny":
+        text = text.replace("  overrides:\n", f"  overrides:\n{NO_FACE_AT_TINY}")
         text += f"\nposes: {{mode: import, modes: {{{ESTIMATED}: estimate}}}}\n"
     config.write_text(text)
     return Project(folder)
