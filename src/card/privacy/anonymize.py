@@ -148,7 +148,6 @@ def _start_worker(scratch: str, *shared: Any) -> None:
     global _worker
     # jpeglib leaves its copies of a raw image behind when it fails: keep them where they are removed.
     tempfile.tempdir = scratch
-    cv2.setNumThreads(1)
     _worker = _Worker(*shared)
 
 

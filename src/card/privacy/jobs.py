@@ -86,6 +86,9 @@ def in_processes(
     label: str,
 ) -> Iterator[Result]:
     """Results of ``work`` in the order of ``items``, from processes that called ``start`` first."""
+    # One thread keeps boxes in one order and shares the cores with the other processes. It is set before
+    # the fork: a child cannot end threads that it did not inherit, and would wait for them for ever.
+    cv2.setNumThreads(1)
     # Forked workers need no importable main module, which a workflow's script does not have.
     pool = ProcessPoolExecutor(
         max_workers=max(1, min(threads, len(items))),

@@ -6,8 +6,6 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-import cv2
-
 from card.artifacts import atomic_folder, read_table, write_report, write_table
 from card.privacy.detection import Detection, Detector
 from card.privacy.detectors import detectors_of, models_of
@@ -92,8 +90,6 @@ _detectors: list[Detector]
 
 def _start_worker(settings: Mapping[str, Any]) -> None:
     global _detectors
-    # Worker processes share the cores already, and one thread keeps the boxes in one order.
-    cv2.setNumThreads(1)
     _detectors = detectors_of(settings)
 
 
