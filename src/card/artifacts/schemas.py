@@ -7,6 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from card.artifacts import long_arrays
 from card.errors import CardError
 
 
@@ -32,13 +33,14 @@ def load_schema(name: str) -> dict[str, Any]:
 
 @cache
 def _validator(name: str) -> Any:
-    from jsonschema import Draft202012Validator
+    from jsonschema import Draft202012Validator, validators
     from referencing import Registry, Resource
 
     def retrieve(uri: str) -> Resource[Any]:
         return Resource.from_contents(load_schema(uri.removesuffix(".schema.json").removeprefix("card:")))
 
-    return Draft202012Validator(load_schema(name), registry=Registry(retrieve=retrieve))  # type: ignore[call-arg]
+    validator = validators.extend(Draft202012Validator, {"items": long_arrays.items})
+    return validator(load_schema(name), registry=Registry(retrieve=retrieve))  # type: ignore[call-arg]
 
 
 def check(document: Any, schema: str, where: object) -> None:

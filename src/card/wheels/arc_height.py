@@ -85,7 +85,9 @@ def corridor_points(
     for run, first, last in _runs(path, window):
         piece = slice(first, last + 1)
         arc = path.knot_arc[piece]
-        d, h, sideways = project(points, path.knot_position[piece], path.knot_rotation[piece], arc)
+        position = path.knot_position[piece]
+        near = _near(points, position, corridor)
+        d, h, sideways = project(points[near], position, path.knot_rotation[piece], arc)
         inside = (np.abs(sideways) <= corridor.half_width_m) & (np.abs(h) <= corridor.max_height_m)
         # The footprint of a wheel that stands at the end of a run reaches beyond it.
         low, high = path.ends(run)
@@ -94,6 +96,17 @@ def corridor_points(
         )
         found.append(RoadPoints(d, sideways, h, np.full(len(d), run)).part(inside))
     return RoadPoints.joined(found)
+
+
+def _near(points: Array, position: Array, corridor: Corridor) -> NDArray[np.bool_]:
+    """Which of the points (P, 3) are so near to the poses (M, 3) that they can be in the corridor."""
+    steps = np.linalg.norm(np.diff(position, axis=0), axis=1)
+    reach = np.hypot(corridor.half_width_m, corridor.max_height_m) + corridor.overhang_m + steps.max()
+    low, high = position.min(axis=0) - reach, position.max(axis=0) + reach
+    near: NDArray[np.bool_] = ((points >= low) & (points <= high)).all(axis=1)
+    distance, _ = cKDTree(position).query(points[near], distance_upper_bound=reach)
+    near[near] = np.isfinite(distance)
+    return near
 
 
 def _runs(path: ContactPath, window: tuple[float, float]) -> Iterator[tuple[int, int, int]]:
