@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from card.report.excitation import Contact, excitation
+from card.report.excitation import Contact, excitation, passed
 from card.report.labels import coverage
 from card.report.map import highest_in_cells
 from card.report.numbers import distance, duration, number, size
@@ -54,3 +54,16 @@ def test_numbers_read_well() -> None:
     assert [size(v) for v in (12, 3_400_000, 2_000_000_000_000_000)] == ["12 B", "3.4 MB", "2e+03 TB"]
     assert [duration(v) for v in (45, 720, 17_000)] == ["45 s", "12 min", "4.7 h"]
     assert [distance(v) for v in (480, 12_345)] == ["480 m", "12.3 km"]
+
+
+def test_labels_stand_where_the_car_passes_them() -> None:
+    """Out along y for 40 m and back beside it: a label ahead is passed twice, one far off never."""
+    out = np.stack([np.zeros(81), np.arange(81) / 2, np.zeros(81)], axis=1)
+    track = np.concatenate([out, out[::-1] + np.array([1.0, 0, 0])])
+    left, right = (
+        Contact(track + np.array([x, 0, 0]), np.zeros(len(track), dtype=bool), 0.7) for x in (-0.8, 0.8)
+    )
+    places = np.array([[0.5, 12.0, 0], [30.0, 12.0, 0]])
+    np.testing.assert_allclose(
+        passed({"fl": left, "fr": right}, places), [12.7, 40 + 1 + 28 + 0.7], atol=0.01
+    )

@@ -21,11 +21,11 @@ from card.artifacts import (
 )
 from card.errors import CardError
 from card.estimation.deskew import deskew_burst
-from card.geometry import Trajectory, apply, from_json, inverse
+from card.geometry import Trajectory, apply, from_json, height_above_road, inverse
 from card.recording.burst import Burst
 from card.recording.laz import read_burst, write_burst
 from card.simulation.calibrations import true_calibration
-from card.wheels import excite, height_above_road
+from card.wheels import excite
 from card.wheels.contact_path import contact_path
 from card.wheels.crop import crop_burst
 from card.wheels.static_points import StaticVoxels

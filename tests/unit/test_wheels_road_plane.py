@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from card.geometry import apply
-from card.wheels import height_above_road
+from card.geometry import apply, height_above_road
 from card.wheels.road_plane import fit_road_planes
 
 RIG = np.array([[-0.8, 0.75, -1.7], [0.8, 0.75, -1.7], [-0.8, -2.1, -1.7], [0.8, -2.1, -1.7]])

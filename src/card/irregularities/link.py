@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from card.artifacts import Figure, progress, read_arrays, read_json, read_table, write_report, write_table
-from card.geometry import CameraModel, Trajectory, apply, from_json, transform
+from card.geometry import CameraModel, Roads, Trajectory, apply, from_json, height_above_road
 from card.irregularities.profile import AGREES, DOUBTFUL, UNKNOWN, Profile, View, box_profile
 from card.irregularities.tables import box_columns, nearest_judged, track_columns
 from card.irregularities.tracks import track_boxes
@@ -105,11 +105,7 @@ class _Scene:
         self._camera = CameraModel.from_json(bundle["cameras"]["camera_left"])
         self._rig_from_camera = from_json(bundle["extrinsics"]["rig_from_camera_left"])
         self._ground_z = float(np.mean([wheel["contact_m"][2] for wheel in bundle["wheels"].values()]))
-        self._roads = {
-            row["frame"]: transform([row[a] for a in "xyz"], [row[f"q{a}"] for a in "wxyz"])
-            for row in read_table(road_planes, "road_planes").to_pylist()
-            if row["valid"]
-        }
+        self._roads = Roads.from_table(read_table(road_planes, "road_planes")).by_frame()
         self._folder = ground_truth
         self._settings = settings
 
@@ -123,7 +119,7 @@ class _Scene:
         band = self._settings["band_m"] + self._settings["band_per_m"] * np.hypot(rig[:, 0], rig[:, 1])
         near = np.abs(rig[:, 2] - self._ground_z) <= band
         road = self._roads.get(frame)
-        height = np.full(int(near.sum()), np.nan) if road is None else apply(road, rig[near])[:, 2]
+        height = np.full(int(near.sum()), np.nan) if road is None else height_above_road(rig[near], road)
         return View(self._camera.project(points[near]), rig[near], height)
 
     def profile(self, view: View, row: Mapping[str, Any]) -> Profile:

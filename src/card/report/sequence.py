@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from card.artifacts import read_arrays, read_json, read_table
-from card.geometry import CameraModel, Trajectory, from_json, transform
+from card.geometry import CameraModel, Roads, Trajectory, from_json
 from card.report.density import draw_density
 from card.report.excitation import Contact, draw_excitation
 from card.report.labels import COLORS, Labels, draw_labels
@@ -46,7 +46,11 @@ def _overlay(folder: Path, stages: Collection[str], out: Path) -> None:
     coverage = read_table(folder / "ground_truth" / "coverage.parquet", "coverage").to_pylist()
     if not coverage:
         return
-    roads = _roads(folder) if "wheels" in stages else {}
+    roads = (
+        Roads.from_table(read_table(folder / "road_planes.parquet", "road_planes")).by_frame()
+        if "wheels" in stages
+        else {}
+    )
     best = max(coverage, key=lambda row: (row["frame"] in roads, row["points_saved"], -row["frame"]))
     frame = int(best["frame"])
     t_ns = {row["frame"]: row["t_ns"] for row in read_table(folder / "frames.parquet", "frames").to_pylist()}
@@ -64,14 +68,6 @@ def _overlay(folder: Path, stages: Collection[str], out: Path) -> None:
         CameraModel.from_json(calibration["cameras"]["camera_left"]),
         None if road_from_rig is None else road_from_rig @ rig_from_camera,
     )
-
-
-def _roads(folder: Path) -> dict[int, Any]:
-    return {
-        row["frame"]: transform([row[a] for a in "xyz"], [row[f"q{a}"] for a in "wxyz"])
-        for row in read_table(folder / "road_planes.parquet", "road_planes").to_pylist()
-        if row["valid"]
-    }
 
 
 def _map(folder: Path, stages: Collection[str], out: Path) -> None:
@@ -134,10 +130,13 @@ def _excitation(folder: Path, stages: Collection[str], out: Path) -> None:
         out,
         {
             name: Contact(
-                np.array(wheel["samples"])[:, 1:4], np.array(wheel["gap"]), wheels[name]["contact_m"][1]
+                np.array(wheel["samples"])[:, 1:4],
+                np.array(wheel["gap"]) | np.array(wheel["uncertain"]),
+                wheels[name]["contact_m"][1],
             )
             for name, wheel in document.items()
         },
+        _places(folder) if "irregularities" in stages else {},
     )
 
 

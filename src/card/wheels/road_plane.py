@@ -1,11 +1,9 @@
-"""The local road plane under the car and heights over it."""
+"""The local road plane under the car."""
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
-from card.geometry import apply
+from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
@@ -51,11 +49,3 @@ def fit_road_planes(contacts_rig: Array) -> RoadPlanes:
     length = np.sqrt(a * a + b * b + 1)
     normal = np.stack([-a, -b, np.ones_like(a)], axis=-1) / length[:, None]
     return RoadPlanes(normal, -c / length, np.sqrt(np.mean(residual**2, axis=1)))
-
-
-def height_above_road(points_rig: ArrayLike, road_from_rig: ArrayLike) -> Array:
-    """Signed heights (N,) in metres of points (N, 3) in rig over the road plane of their frame.
-
-    road_from_rig : (4, 4), of the frame's row in ``road_planes.parquet``.
-    """
-    return apply(road_from_rig, points_rig)[..., 2]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from card.artifacts import read_json, read_table
 from card.errors import CardError
-from card.geometry import inverse, transform
+from card.geometry import Roads, inverse, transform
 from card.packaging.reader.files import open_files
 from card.packaging.reader.frame import Frame
 from card.packaging.reader.rig import Rig
@@ -41,7 +41,7 @@ class Release:
         self.tree = self._files.root
         self._rigs: dict[str, Rig] = {}
         self._moments: dict[str, dict[tuple[str, int], Array]] = {}
-        self._roads: dict[str, dict[int, Array]] = {}
+        self._roads: dict[str, Mapping[int, Array]] = {}
         columns = self._table("metadata/members.parquet", "release_members").to_pydict()
         self._members: dict[Key, tuple[Any, ...]] = {
             (sequence, modality, frame if burst is None else burst): tuple(rest)
@@ -191,18 +191,13 @@ class Release:
             }
         return self._moments[sequence]
 
-    def _road(self, sequence: str) -> dict[int, Array]:
+    def _road(self, sequence: str) -> Mapping[int, Array]:
         """``road_from_rig`` by frame."""
         if sequence not in self._roads:
             path = self._files.local(f"sequences/{sequence}/road_planes.parquet")
-            rows = read_table(path, "road_planes").to_pylist() if path.is_file() else []
-            self._roads[sequence] = {
-                row["frame"]: transform(
-                    [row[axis] for axis in ("x", "y", "z")], [row[axis] for axis in ("qw", "qx", "qy", "qz")]
-                )
-                for row in rows
-                if row["valid"]
-            }
+            self._roads[sequence] = (
+                Roads.from_table(read_table(path, "road_planes")).by_frame() if path.is_file() else {}
+            )
         return self._roads[sequence]
 
     def _table(self, path: str, schema: str) -> Any:
