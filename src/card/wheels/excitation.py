@@ -92,8 +92,8 @@ def excite(
 
     table = read_table(frames, "frames")
     t_ns = np.asarray(table["t_ns"], dtype=np.int64)
-    planes, measured = frame_planes(wheels, path, t_ns)
-    valid = measured & (planes.residual_m <= settings["max_plane_residual_m"])
+    planes, std = frame_planes(wheels, path, t_ns)
+    valid = (std <= settings["max_plane_std_m"]) & (planes.residual_m <= settings["max_plane_residual_m"])
 
     write_json(wheel_excitation, excitation_document(wheels, path), "wheel_excitation")
     write_table(road_planes, plane_columns(np.asarray(table["frame"]), t_ns, planes, valid), "road_planes")

@@ -37,13 +37,14 @@ def excitation_document(wheels: Mapping[str, Excitation], trajectory: Trajectory
 
 def frame_planes(
     wheels: Mapping[str, Excitation], trajectory: Trajectory, t_ns: NDArray[np.int64]
-) -> tuple[RoadPlanes, NDArray[np.bool_]]:
-    """The road planes at frame times (F,) and whether all contacts then are measured (F,)."""
+) -> tuple[RoadPlanes, Array]:
+    """The road planes at frame times (F,) and the root mean square of their contacts' standard deviations
+    (F,), metres; infinite where one is in a gap."""
     found = [wheel.at(t_ns) for wheel in wheels.values()]
     rig_from_world = inverse(trajectory.at(t_ns))
     contacts = np.stack([apply(rig_from_world, position) for position, _ in found], axis=1)
-    measured = np.all([measured for _, measured in found], axis=0)
-    return fit_road_planes(contacts), measured
+    std = np.sqrt(np.mean([std**2 for _, std in found], axis=0))
+    return fit_road_planes(contacts), std
 
 
 def plane_columns(

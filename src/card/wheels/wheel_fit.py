@@ -48,14 +48,15 @@ class Excitation:
         """Whether each sample (N,) is neither a gap nor uncertain."""
         return ~(self.gap | self.uncertain)
 
-    def at(self, t_ns: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
-        """Contact points (F, 3) at times (F,) within the trajectory, and whether both samples beside are
-        measured (F,)."""
+    def at(self, t_ns: ArrayLike) -> tuple[Array, Array]:
+        """Contact points (F, 3) at times (F,) within the trajectory, and the greater standard deviation (F,)
+        of the samples beside, metres; infinite beside a gap."""
         t = np.asarray(t_ns, dtype=np.int64)
         i = np.clip(np.searchsorted(self.t_ns, t, side="right"), 1, len(self.t_ns) - 1)
         alpha = ((t - self.t_ns[i - 1]) / (self.t_ns[i] - self.t_ns[i - 1]))[:, None]
         position = (1 - alpha) * self.position[i - 1] + alpha * self.position[i]
-        return position, self.measured[i - 1] & self.measured[i]
+        std = np.where(self.gap, np.inf, self.std_m)
+        return position, np.maximum(std[i - 1], std[i])
 
 
 def fit_excitation(
