@@ -18,6 +18,7 @@ STAGES = [
     "poses",
     "ground_truth",
     "wheels",
+    "privacy_search",
     "privacy",
     "annotations",
     "splits",
