@@ -118,6 +118,6 @@ def test_bundle_errors_are_those_put_in() -> None:
 
 
 def test_missing_results_give_no_value(tmp_path: Path) -> None:
-    for stage, count in (("poses", 12), ("wheels", 3), ("calibration", 7)):
+    for stage, count in (("poses", 12), ("wheels", 9), ("calibration", 7)):
         rows = accuracy(stage).rows(tmp_path, tmp_path, ["nowhere"])
         assert [row["value"] for row in rows] == [None] * count

@@ -30,6 +30,9 @@ def run(folder: Path, **changes: Any) -> tuple[Any, dict[str, Any]]:
     return read_table(folder / "odometry.parquet", "odometry_states"), report
 
 
+LIMIT_MS = default_settings("odometry")["max_clock_offset_ms"]
+
+
 def figures(report: dict[str, Any]) -> dict[str, float]:
     return {figure["name"]: figure["value"] for figure in report["figures"]}
 
@@ -73,7 +76,7 @@ def test_a_drive_that_starts_in_motion_is_followed_to_millimetres(street: Street
     assert np.degrees(angle.max()) < 0.05
     values = figures(report)
     assert values["registered_pct"] == 100
-    assert abs(values["clock_offset_ms"]) < 5  # half of what is refused
+    assert abs(values["clock_offset_ms"]) < LIMIT_MS  # some ms of bias where the start is in motion
     assert values["length_m"] == pytest.approx(6.0 * 2.8, rel=0.01)
     last = {name: table[name][-1].as_py() for name in table.column_names}
     assert np.hypot(last["vx"], last["vy"]) == pytest.approx(6.0, abs=0.02)
@@ -169,8 +172,18 @@ def test_clocks_that_differ_are_measured_and_refused(folder: Path, copy: Path) -
         run(copy)
     measured = re.search(r"IMU's is (\S+) ms ahead", str(refused.value))
     assert measured is not None
-    assert float(measured[1]) == pytest.approx(50, abs=6)
+    assert float(measured[1]) == pytest.approx(50, abs=LIMIT_MS)
     assert float(measured[1]) - without == pytest.approx(50, abs=2)
+
+
+def test_an_offset_that_explains_nothing_is_not_believed(
+    folder: Path, copy: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("card.poses.scan_checks.clock_offset", lambda imu, windows: (-0.276, 1e-4))
+    _, report = run(copy)
+    assert figures(report)["clock_offset_ms"] is None
+    assert figures(report)["scan_gyro_error_deg"] < 0.5
+    assert any("too poor" in note for note in report["notes"])
 
 
 def test_a_sweep_without_times_is_refused_unless_it_is_deskewed(copy: Path) -> None:
