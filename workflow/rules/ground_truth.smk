@@ -1,34 +1,6 @@
 # Needs: bursts of both LiDARs, calibration, the trajectory at IMU rate.
 # Makes: results/{id}/ground_truth/ with one npz a frame, the static voxels and the coverage.
 # With a monocular consensus also: the anonymized images, or a folder of depth maps.
-CONSENSUS = SETTINGS["ground_truth"]["consensus"]
-
-
-def consensus_images(wildcards):
-    """Only a model looks at images, and at none but anonymized ones."""
-    if wildcards.id in CONSENSUS["sequences"] and CONSENSUS["model"]:
-        return [f"results/{wildcards.id}/anonymized/inventory.parquet"]
-    return []
-
-
-def consensus_maps(wildcards):
-    """Fingerprint of the depth maps that a user gives for a sequence."""
-    if wildcards.id not in CONSENSUS["sequences"] or not CONSENSUS["depth_maps"]:
-        return None
-    return fingerprint(
-        Path(CONSENSUS["depth_maps"], wildcards.id),
-        Path("results", wildcards.id, "depth_maps.fingerprint.json"),
-    )
-
-
-def ground_truth_cfg(wildcards):
-    """Settings of the stage; a consensus of other sequences is none of this one's."""
-    found = cfg("ground_truth")
-    if wildcards.id not in CONSENSUS["sequences"]:
-        found["settings"] |= {"consensus": {"sequences": []}}
-    else:
-        found["settings"] |= {"consensus": CONSENSUS | {"sequences": [wildcards.id]}}
-    return found
 
 
 rule ground_truth:

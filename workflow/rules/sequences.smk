@@ -1,4 +1,5 @@
 # What each sequence has, and what it therefore goes into: the functions that the rule files ask.
+CONSENSUS = SETTINGS["ground_truth"]["consensus"]
 
 
 def row(*names):
@@ -300,6 +301,33 @@ def evaluations(wildcards):
             "card: no predictions to evaluate: name them in config.yaml under benchmark.methods"
         )
     return tables
+
+
+def consensus_images(wildcards):
+    """Only a model looks at images, and at none but anonymized ones."""
+    if wildcards.id in CONSENSUS["sequences"] and CONSENSUS["model"]:
+        return [f"results/{wildcards.id}/anonymized/inventory.parquet"]
+    return []
+
+
+def consensus_maps(wildcards):
+    """Fingerprint of the depth maps that a user gives for a sequence."""
+    if wildcards.id not in CONSENSUS["sequences"] or not CONSENSUS["depth_maps"]:
+        return None
+    return fingerprint(
+        Path(CONSENSUS["depth_maps"], wildcards.id),
+        Path("results", wildcards.id, "depth_maps.fingerprint.json"),
+    )
+
+
+def ground_truth_cfg(wildcards):
+    """Settings of the stage; a consensus of other sequences is none of this one's."""
+    found = cfg("ground_truth")
+    if wildcards.id not in CONSENSUS["sequences"]:
+        found["settings"] |= {"consensus": {"sequences": []}}
+    else:
+        found["settings"] |= {"consensus": CONSENSUS | {"sequences": [wildcards.id]}}
+    return found
 
 
 def detectors():
