@@ -13,6 +13,7 @@ rule privacy_search:
     log:
         "logs/{id}/privacy_search.log",
     priority: 1
+    threads: 2
     params:
         cfg=cfg(
             "privacy",
