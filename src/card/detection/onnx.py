@@ -131,7 +131,7 @@ class OnnxDetector:
             raise CardError("model takes another size", where=self._model, found=shape[2:], wanted=size)
 
 
-def providers() -> list[str]:
+def _providers() -> list[str]:
     """A GPU's execution provider where the installed runtime has one, then the CPU's."""
     import onnxruntime
 
@@ -139,21 +139,32 @@ def providers() -> list[str]:
     return [name for name in ("CUDAExecutionProvider", "CPUExecutionProvider") if name in there]
 
 
-def _session(model: Path, sha256: str, threads: int) -> Any:
+def open_session(model: str | bytes, where: object, threads: int) -> Any:
+    """An onnxruntime session of a file or its content, on the best provider there is.
+
+    Raises
+    ------
+    CardError
+        If it is no ONNX; ``where`` names the model.
+    """
     import onnxruntime
 
-    if not model.is_file():
-        raise CardError("model is missing", where=model)
-    if (found := sha256_file(model)) != sha256:
-        raise CardError("model has another hash", where=model, found=found, wanted=sha256)
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = threads
     options.inter_op_num_threads = 1
     options.log_severity_level = 4  # errors are raised
     try:
-        return onnxruntime.InferenceSession(str(model), options, providers=providers())
+        return onnxruntime.InferenceSession(model, options, providers=_providers())
     except Exception as error:
-        raise CardError("model is no ONNX", where=model, found=_first_line(error)) from error
+        raise CardError("model is no ONNX", where=where, found=_first_line(error)) from error
+
+
+def _session(model: Path, sha256: str, threads: int) -> Any:
+    if not model.is_file():
+        raise CardError("model is missing", where=model)
+    if (found := sha256_file(model)) != sha256:
+        raise CardError("model has another hash", where=model, found=found, wanted=sha256)
+    return open_session(str(model), model, threads)
 
 
 def _first_line(error: Exception) -> str:

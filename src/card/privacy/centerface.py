@@ -11,9 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 from card.detection.boxes import keep_best
+from card.detection.onnx import open_session
 from card.privacy.detection import Detection
 from card.privacy.models import CENTERFACE
-from card.privacy.runtime import enlarged_tiles, session_of
+from card.privacy.tiling import enlarged_tiles
 
 # Names of the network's input and outputs: heat map, log size, offset, landmarks (unused).
 _INPUT, _OUTPUTS = "input.1", ("537", "538", "539")
@@ -40,7 +41,8 @@ class CenterFaceDetector:
 
     def __init__(self, settings: Mapping[str, Any], tile_px: int, tile_overlap_px: int) -> None:
         self._settings, self._tile = settings, (tile_px, tile_overlap_px)
-        self._session = session_of(_any_size(CENTERFACE.path().read_bytes()), self.name)
+        # Images share the cores already: one thread each.
+        self._session = open_session(_any_size(CENTERFACE.path().read_bytes()), self.name, threads=1)
 
     def detect(self, image: npt.NDArray[np.uint8]) -> list[Detection]:
         """Faces in ``image``, (H, W, 3) uint8 RGB, the surest first."""

@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from card.detection.onnx import open_session
 from card.privacy.detection import Detection
 from card.privacy.models import TEXT
-from card.privacy.runtime import enlarged_tiles, session_of
+from card.privacy.tiling import enlarged_tiles
 
 
 class TextDetector:
@@ -39,7 +40,8 @@ class TextDetector:
 
     def __init__(self, settings: Mapping[str, Any], tile_px: int, tile_overlap_px: int) -> None:
         self._settings, self._tile = settings, (tile_px, tile_overlap_px)
-        self._session = session_of(TEXT.path().read_bytes(), self.name)
+        # Images share the cores already: one thread each.
+        self._session = open_session(TEXT.path().read_bytes(), self.name, threads=1)
 
     def detect(self, image: npt.NDArray[np.uint8]) -> list[Detection]:
         """Text in ``image``, (H, W, 3) uint8 RGB, tile by tile, each from top to bottom."""

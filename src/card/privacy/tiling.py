@@ -1,28 +1,11 @@
-"""Runs a packaged network on one image, tile by tile."""
+"""An image as the packaged networks see it, tile by tile."""
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from card.detection.views import View, tiles
-from card.errors import CardError
-
-
-def session_of(model: bytes, name: str) -> Any:
-    """An onnxruntime session on the best provider there is, one thread: images share the cores already."""
-    import onnxruntime
-
-    from card.detection.onnx import providers
-
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = options.inter_op_num_threads = 1
-    options.log_severity_level = 4  # errors are raised
-    try:
-        return onnxruntime.InferenceSession(model, options, providers=providers())
-    except Exception as error:
-        raise CardError("model is no ONNX", where=name, found=str(error).splitlines()[0]) from error
 
 
 def enlarged_tiles(
