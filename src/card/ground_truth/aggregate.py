@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +20,7 @@ from card.artifacts import (
     write_arrays,
     write_table,
 )
+from card.artifacts.processes import in_processes
 from card.errors import CardError
 from card.geometry import Trajectory
 from card.ground_truth.consensus import Consensus, DepthSource, depth_maps
@@ -187,27 +186,14 @@ def _tasks(frames: Path, drive: Drive) -> list[_Task]:
     return tasks
 
 
-# Set before the processes fork: they inherit it, nothing is pickled.
-_inherited: list[_Work] = []
-
-
 def _rows(work: _Work, tasks: list[_Task], threads: int) -> Iterator[dict[str, Any]]:
-    if threads < 2 or len(tasks) < 2:
-        yield from work.rows(tasks)
-        return
     # Consecutive frames share most of their bursts, so each process takes one run of them.
     runs = [tasks[at[0] : at[-1] + 1] for at in np.array_split(np.arange(len(tasks)), threads) if len(at)]
-    _inherited.append(work)
-    try:
-        with ProcessPoolExecutor(len(runs), mp_context=get_context("fork")) as pool:
-            for rows in pool.map(_run, runs):
-                yield from rows
-    finally:
-        _inherited.pop()
-
-
-def _run(tasks: list[_Task]) -> list[dict[str, Any]]:
-    return list(_inherited[-1].rows(tasks))
+    if len(runs) == 1:
+        yield from work.rows(tasks)
+        return
+    for rows in in_processes(lambda run: list(work.rows(run)), runs, threads):
+        yield from rows
 
 
 def _write_static(path: Path, static: StaticSet) -> None:

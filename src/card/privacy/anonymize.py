@@ -2,7 +2,7 @@
 
 import tempfile
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -11,11 +11,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from card.artifacts import atomic_folder, inventory, read_table, write_table
+from card.artifacts import atomic_folder, inventory, progress, read_table, write_table
+from card.artifacts.processes import in_processes
 from card.errors import CardError
 from card.privacy.account import Outcome, image_columns, write_account
 from card.privacy.detectors import models_of
-from card.privacy.jobs import Job, image_jobs, in_processes, read_image
+from card.privacy.jobs import Job, image_jobs, read_image
 from card.privacy.propagate import Propagation
 from card.privacy.recall import read_labels
 from card.privacy.redaction import redact
@@ -70,16 +71,9 @@ def anonymize(
     with atomic_folder(out) as folder, tempfile.TemporaryDirectory() as scratch:
         for camera in {job.camera for job in jobs}:
             (folder / camera).mkdir()
-        outcomes = list(
-            in_processes(
-                _anonymize_image,
-                jobs,
-                start=_start_worker,
-                arguments=[scratch, jobs, boxes, searched, corrections, eyes, folder, settings],
-                threads=threads,
-                label=f"privacy {out.parent.name}",
-            )
-        )
+        start = partial(_start_worker, scratch, jobs, boxes, searched, corrections, eyes, folder, settings)
+        results = in_processes(_anonymize_image, jobs, threads, prepare=start)
+        outcomes = list(progress(results, f"privacy {out.parent.name}", len(jobs)))
         names = [model["name"] for model in models_of(settings)]
         write_table(folder / "images.parquet", image_columns(jobs, outcomes, names), "images")
         rows = [

@@ -1,22 +1,15 @@
-"""The images of a sequence, and worker processes for them."""
+"""The images of a sequence."""
 
-import multiprocessing
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from card.artifacts import progress
 from card.errors import CardError
 from card.privacy.markers import sanitized
-
-Item = TypeVar("Item")
-Result = TypeVar("Result")
 
 
 @dataclass(frozen=True)
@@ -74,27 +67,3 @@ def read_image(path: Path) -> tuple[bytes, bytes, NDArray[np.uint8]]:
     if image is None:
         raise CardError("unreadable JPEG", where=path)
     return raw, content, np.ascontiguousarray(image[..., ::-1])
-
-
-def in_processes(
-    work: Callable[[Item], Result],
-    items: Sequence[Item],
-    *,
-    start: Callable[..., None],
-    arguments: Iterable[Any],
-    threads: int,
-    label: str,
-) -> Iterator[Result]:
-    """Results of ``work`` in the order of ``items``, from processes that called ``start`` first."""
-    # One thread keeps boxes in one order and shares the cores with the other processes. It is set before
-    # the fork: a child cannot end threads that it did not inherit, and would wait for them for ever.
-    cv2.setNumThreads(1)
-    # Forked workers need no importable main module, which a workflow's script does not have.
-    pool = ProcessPoolExecutor(
-        max_workers=max(1, min(threads, len(items))),
-        mp_context=multiprocessing.get_context("fork"),
-        initializer=start,
-        initargs=tuple(arguments),
-    )
-    with pool:
-        yield from progress(pool.map(work, items), label, len(items))

@@ -2,14 +2,16 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from card.artifacts import atomic_folder, read_table, write_report, write_table
+from card.artifacts import atomic_folder, progress, read_table, write_report, write_table
+from card.artifacts.processes import in_processes
 from card.privacy.detection import Detection, Detector
 from card.privacy.detectors import detectors_of, models_of
-from card.privacy.jobs import Job, image_jobs, in_processes, read_image
+from card.privacy.jobs import Job, image_jobs, read_image
 from card.privacy.tables import detection_columns
 
 
@@ -50,16 +52,8 @@ def search(
     detectors_of(settings)
     jobs = image_jobs(recording, read_table(frames, "frames"))
     with atomic_folder(out) as folder:
-        found = list(
-            in_processes(
-                _search,
-                jobs,
-                start=_start_worker,
-                arguments=[settings],
-                threads=threads,
-                label=f"search {out.parent.name}",
-            )
-        )
+        results = in_processes(_search, jobs, threads, prepare=partial(_start_worker, settings))
+        found = list(progress(results, f"search {out.parent.name}", len(jobs)))
         images = {
             "camera": [job.camera for job in jobs],
             "t_ns": [job.t_ns for job in jobs],

@@ -5,10 +5,10 @@ from functools import cached_property
 from pathlib import Path
 
 from card.artifacts import progress, write_arrays
+from card.artifacts.processes import in_processes
 from card.recording.laz import write_burst
 from card.recording.paths import burst_path
 from card.simulation.bodies import ego_body
-from card.simulation.forked import shared_out
 from card.simulation.lidar import Lidar, burst_starts
 from card.simulation.photographs import Photographer, Shown, exposures, write_labels
 from card.simulation.raycast import Scene, Tracer
@@ -62,7 +62,7 @@ def _runs(counts: dict[str, int]) -> list[Run]:
 
 def _record(recorder: "_Recorder", runs: list[Run], threads: int) -> list[Shown]:
     label = f"{recorder.world.name} sensors"
-    done = progress(shared_out(recorder.record, runs, threads), label, len(runs))
+    done = progress(in_processes(recorder.record, runs, threads), label, len(runs))
     return [shown for found in done for shown in found]
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from card.artifacts import atomic_folder, progress, write_json
+from card.artifacts.processes import in_processes
 from card.geometry import CameraModel, from_json, to_json
 from card.recording.laz import write_burst
 from card.simulation.board_images import BoardCameras, write_board_yaml
@@ -22,7 +23,6 @@ from card.simulation.calibrations import (
     true_calibration,
 )
 from card.simulation.ego import ego_pixels
-from card.simulation.forked import shared_out
 from card.simulation.lidar import PERIOD_NS
 from card.simulation.quads import Quad
 from card.simulation.rig import Rig
@@ -50,7 +50,7 @@ def simulate_session(
         write_board_yaml(partial)
         (partial / "lidar_front").mkdir()
         boards = _Boards(session, seed, scale, rig, partial)
-        done = shared_out(boards.show, range(count), threads)
+        done = in_processes(boards.show, range(count), threads)
         views = list(progress(done, f"{session} board", count))
         calibration = delivered_calibration(session, seed, scale, views=count)
         write_json(partial / "calibration.json", calibration, "calibration")

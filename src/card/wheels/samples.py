@@ -1,9 +1,7 @@
 """Road points under each wheel, streamed out of the bursts."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from card.artifacts import progress
+from card.artifacts.processes import in_processes
 from card.estimation.deskew import deskew_burst
 from card.geometry import Trajectory
 from card.recording.laz import read_burst
@@ -105,25 +104,5 @@ class Cutter:
 def collect_samples(bursts: Sequence[BurstFile], cutter: Cutter, threads: int) -> list[RoadPoints]:
     """Each wheel's corridor points of all bursts, in their order; `threads` processes share the bursts."""
     blocks = [bursts[i : i + BURSTS_AT_ONCE] for i in range(0, len(bursts), BURSTS_AT_ONCE)]
-    found = list(progress(_cut(blocks, cutter, threads), "wheels", total=len(blocks)))
+    found = list(progress(in_processes(cutter.cut, blocks, threads), "wheels", len(blocks)))
     return [RoadPoints.joined([block[wheel] for block in found]) for wheel in range(len(cutter.paths))]
-
-
-# Set before the processes fork: they inherit it, nothing is pickled.
-_inherited: list[Cutter] = []
-
-
-def _cut(blocks: Sequence[Sequence[BurstFile]], cutter: Cutter, threads: int) -> Iterator[list[RoadPoints]]:
-    if threads < 2 or len(blocks) < 2:
-        yield from map(cutter.cut, blocks)
-        return
-    _inherited.append(cutter)
-    try:
-        with ProcessPoolExecutor(threads, mp_context=get_context("fork")) as pool:
-            yield from pool.map(_cut_block, blocks)
-    finally:
-        _inherited.pop()
-
-
-def _cut_block(block: Sequence[BurstFile]) -> list[RoadPoints]:
-    return _inherited[-1].cut(block)
