@@ -5,7 +5,6 @@ import shutil
 import subprocess
 import time
 from collections.abc import Iterator
-from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -58,8 +57,6 @@ def cluster(tmp_path: Path) -> Iterator[Path]:
     """A cluster of this machine for the time of a test; its folder."""
     if os.geteuid() != 0 or not all(map(shutil.which, DAEMONS)):
         pytest.skip(f"needs root and {', '.join(DAEMONS)}")
-    if find_spec("snakemake_executor_plugin_slurm") is None:
-        pytest.skip("needs the package snakemake-executor-plugin-slurm")
     if CONF.exists():
         pytest.skip(f"this machine has a cluster of its own: {CONF}")
     folder = tmp_path / "cluster"
