@@ -179,7 +179,7 @@ def test_clocks_that_differ_are_measured_and_refused(folder: Path, copy: Path) -
 def test_an_offset_that_explains_nothing_is_not_believed(
     folder: Path, copy: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("card.poses.scan_checks.clock_offset", lambda imu, windows: (-0.276, 1e-4))
+    monkeypatch.setattr("card.estimation.scan_checks.clock_offset", lambda imu, windows: (-0.276, 1e-4))
     _, report = run(copy)
     assert figures(report)["clock_offset_ms"] is None
     assert figures(report)["scan_gyro_error_deg"] < 0.5

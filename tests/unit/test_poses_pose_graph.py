@@ -12,14 +12,14 @@ from street_scene import START_NS, Motion, Street, houses, standing, swaying, tu
 from card.artifacts import default_settings, read_json, read_table, write_table
 from card.errors import CardError
 from card.estimation.batch import Nodes
+from card.estimation.dense import dense_trajectory
 from card.estimation.imu import read_imu
+from card.estimation.odometry import plane_settings
 from card.geometry import Trajectory, inverse, transform
 from card.poses.anchor import anchor
-from card.poses.dense import dense_trajectory
 from card.poses.estimate_odometry import estimate_odometry, open_scans
 from card.poses.loops import LoopVerifier, candidates, travelled
 from card.poses.map_quality import map_figures
-from card.poses.odometry import plane_settings
 from card.poses.pose_graph import refine_odometry
 from card.poses.sweep_store import SweepStore, along_trajectory
 from card.poses.take_refined import take_refined

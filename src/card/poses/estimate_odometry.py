@@ -9,9 +9,10 @@ import numpy as np
 from card.artifacts import Figure, read_json, read_table, write_report, write_table
 from card.errors import CardError
 from card.estimation.imu import read_imu
+from card.estimation.odometry import Step, plane_settings, run_odometry
+from card.estimation.scan_checks import check_against_scans, check_imu
 from card.estimation.scans import Limits, Scans
-from card.poses.odometry import odometry_columns, plane_settings, run_odometry
-from card.poses.scan_checks import check_against_scans, check_imu
+from card.geometry import quaternion_from_matrix
 from card.recording.description import read_description
 from card.recording.paths import imu_path
 
@@ -68,7 +69,7 @@ def estimate_odometry(
         ),
         Figure("max_step_s", float(seconds.max()), "s", "longest time between sweeps"),
     ]
-    write_table(odometry, odometry_columns(steps, scans), "odometry_states")
+    write_table(odometry, _odometry_columns(steps, scans), "odometry_states")
     write_report(
         report,
         stage="odometry",
@@ -93,3 +94,33 @@ def open_scans(recording: Path, bursts: Path, calibration: Path, settings: Mappi
         settings["lidars"],
         Limits(settings["min_range_m"], settings["max_range_m"], (low, high)),
     )
+
+
+def _odometry_columns(steps: Sequence[Step], scans: Scans) -> dict[str, Any]:
+    """The columns of schema ``odometry_states``."""
+    states = [step.state for step in steps]
+    pose = np.stack([state.pose for state in states])
+    quaternion = quaternion_from_matrix(pose[:, :3, :3])
+    columns: dict[str, Any] = {
+        "t_ns": np.array([state.t_ns for state in states], dtype=np.int64),
+        "lidar": [str(scans.lidar[step.scan]) for step in steps],
+        "burst": np.array([scans.burst[step.scan] for step in steps], dtype=np.int32),
+        "registered": np.array([step.found is not None for step in steps]),
+        "known_fraction": np.array([step.found.known_fraction if step.found else 0.0 for step in steps]),
+        "inlier_fraction": np.array([step.found.inlier_fraction if step.found else 0.0 for step in steps]),
+        "rms_m": np.array([step.found.rms_m if step.found else 0.0 for step in steps]),
+    }
+    vectors = {
+        "": pose[:, :3, 3],
+        "v": np.stack([state.velocity for state in states]),
+        "gyro_bias_": np.stack([state.gyro_bias for state in states]),
+        "accel_bias_": np.stack([state.accel_bias for state in states]),
+        "gravity_": np.stack([state.gravity for state in states]),
+    }
+    columns |= {
+        f"{name}{axis}": values[:, i] for name, values in vectors.items() for i, axis in enumerate("xyz")
+    }
+    columns |= {f"q{axis}": quaternion[:, i] for i, axis in enumerate("wxyz")}
+    information = np.stack([step.found.information if step.found else np.zeros((6, 6)) for step in steps])
+    columns |= {f"information_{i}{j}": information[:, i, j] for i in range(6) for j in range(i, 6)}
+    return columns

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from card.artifacts import Figure, read_json, read_table, write_json, write_report, write_table
 from card.estimation.imu import Imu, read_imu
+from card.estimation.imu_checks import imu_figures
 from card.geometry import Trajectory, inverse, quaternion_from_matrix
 from card.poses.anchor import anchor, tilt_deg
-from card.poses.imu_checks import imu_figures
 from card.poses.map_quality import map_figures
 from card.poses.members import pose_document, read_members
 from card.poses.plausibility import check_coverage, check_motion, check_upright

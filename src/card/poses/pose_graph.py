@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from card.artifacts import atomic_file, read_table, write_report, write_table
 from card.estimation.batch import Batch, Nodes, write_g2o
+from card.estimation.dense import dense_trajectory
 from card.estimation.imu import ImuNoise, read_imu
+from card.estimation.odometry import plane_settings
 from card.geometry import Trajectory, inverse, quaternion_from_matrix
 from card.poses.anchor import anchor
-from card.poses.dense import dense_trajectory
 from card.poses.estimate_odometry import open_scans
 from card.poses.graph_tables import figures_of, loop_columns, node_columns, sigma_of
 from card.poses.loops import LoopVerifier
-from card.poses.odometry import plane_settings
 from card.poses.refine import local_constraints, refine
 from card.poses.sweep_store import SweepStore, along_nodes
 from card.recording.description import read_description

@@ -9,9 +9,7 @@ from numpy.typing import NDArray
 from card.artifacts import Figure
 from card.errors import CardError
 from card.estimation.imu import Imu
-from card.estimation.plane_map import PlaneSettings
-from card.estimation.scans import Scans
-from card.poses.imu_checks import (
+from card.estimation.imu_checks import (
     accel_cause,
     accel_unit_cause,
     clock_offset,
@@ -19,8 +17,10 @@ from card.poses.imu_checks import (
     integrated_gyro,
     windows_of,
 )
-from card.poses.lidar_only import scan_trajectory
-from card.poses.odometry import covered_sweeps
+from card.estimation.lidar_only import scan_trajectory
+from card.estimation.odometry import covered_sweeps
+from card.estimation.plane_map import PlaneSettings
+from card.estimation.scans import Scans
 
 #: Angle between mean specific force and the rig's z above which no car stands or drives, deg.
 MAX_TILT_DEG = 45.0

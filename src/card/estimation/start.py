@@ -4,9 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from card.estimation.imu import Imu
+from card.estimation.smoother import StartSigmas, State
 from card.estimation.strapdown import integrate
 from card.geometry import Trajectory, transform
-from card.poses.smoother import StartSigmas, State
 
 Array = NDArray[np.float64]
 #: How well a second of scans and IMU tells velocity (m/s) and the direction of gravity (rad).

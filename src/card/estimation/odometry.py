@@ -1,6 +1,6 @@
-"""Stage 1: LiDAR-inertial odometry, scan by scan."""
+"""LiDAR-inertial odometry, scan by scan."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,14 +11,14 @@ from scipy.spatial.transform import Rotation
 from card.artifacts import progress
 from card.errors import CardError
 from card.estimation.imu import Imu, ImuNoise
+from card.estimation.lidar_only import scan_trajectory
 from card.estimation.plane_kernels import voxel_means
 from card.estimation.plane_map import PlaneMap, PlaneSettings, Registration
 from card.estimation.scans import Scan, Scans
+from card.estimation.smoother import Smoother, State
+from card.estimation.start import SIGMAS, start_state
 from card.estimation.strapdown import Path, integrate
-from card.geometry import apply, inverse, quaternion_from_matrix
-from card.poses.lidar_only import scan_trajectory
-from card.poses.smoother import Smoother, State
-from card.poses.start import SIGMAS, start_state
+from card.geometry import apply, inverse
 
 Array = NDArray[np.float64]
 
@@ -150,33 +150,3 @@ class Odometry:
     def _insert(self, points: Array, pose: Array) -> None:
         self._map.insert(apply(pose, voxel_means(points, self._settings["map_points_leaf_m"])))
         self._keyframe = pose
-
-
-def odometry_columns(steps: Sequence[Step], scans: Scans) -> dict[str, Any]:
-    """The columns of schema ``odometry_states``."""
-    states = [step.state for step in steps]
-    pose = np.stack([state.pose for state in states])
-    quaternion = quaternion_from_matrix(pose[:, :3, :3])
-    columns: dict[str, Any] = {
-        "t_ns": np.array([state.t_ns for state in states], dtype=np.int64),
-        "lidar": [str(scans.lidar[step.scan]) for step in steps],
-        "burst": np.array([scans.burst[step.scan] for step in steps], dtype=np.int32),
-        "registered": np.array([step.found is not None for step in steps]),
-        "known_fraction": np.array([step.found.known_fraction if step.found else 0.0 for step in steps]),
-        "inlier_fraction": np.array([step.found.inlier_fraction if step.found else 0.0 for step in steps]),
-        "rms_m": np.array([step.found.rms_m if step.found else 0.0 for step in steps]),
-    }
-    vectors = {
-        "": pose[:, :3, 3],
-        "v": np.stack([state.velocity for state in states]),
-        "gyro_bias_": np.stack([state.gyro_bias for state in states]),
-        "accel_bias_": np.stack([state.accel_bias for state in states]),
-        "gravity_": np.stack([state.gravity for state in states]),
-    }
-    columns |= {
-        f"{name}{axis}": values[:, i] for name, values in vectors.items() for i, axis in enumerate("xyz")
-    }
-    columns |= {f"q{axis}": quaternion[:, i] for i, axis in enumerate("wxyz")}
-    information = np.stack([step.found.information if step.found else np.zeros((6, 6)) for step in steps])
-    columns |= {f"information_{i}{j}": information[:, i, j] for i in range(6) for j in range(i, 6)}
-    return columns
