@@ -2,9 +2,12 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis.extra.numpy import arrays
+from hypothesis.strategies import DataObject, booleans, data, floats, integers, sampled_from
 
 from card.errors import CardError
-from card.estimation.deskew import deskew_burst
+from card.estimation.deskew import deskew_burst, deskew_plain
 from card.geometry import Trajectory, apply, transform
 from card.geometry.corrections import correct_points
 from card.recording.burst import Burst
@@ -68,4 +71,48 @@ def test_poses_that_do_not_cover_the_end_are_refused() -> None:
     with pytest.raises(CardError, match="poses do not cover the burst"):
         deskew_burst(
             burst(), RIG_FROM_LIDAR, turning(), motion_compensate=False, end_ns=START_NS + 1_000_000_001
+        )
+
+
+def test_a_burst_that_ends_after_the_poses_is_refused_whatever_end_is_given() -> None:
+    late = burst()
+    path = turning()
+    short = Trajectory(path.t_ns[:25], path.translation_m[:25], path.rotation_wxyz[:25])
+    with pytest.raises(CardError, match="poses do not cover the burst"):
+        deskew_burst(late, RIG_FROM_LIDAR, short, end_ns=late.t_ns)
+
+
+channel_offsets = arrays(np.float64, 32, elements=floats(-0.05, 0.05))
+
+
+@settings(max_examples=60, deadline=None)
+@given(data())
+def test_the_compiled_path_places_points_where_the_plain_one_does(draw: DataObject) -> None:
+    """Any sweep, sorted in time or not, over any poses, dense or sparse, still or turning, near or far."""
+    count = draw.draw(integers(0, 40))
+    rng = np.random.default_rng(draw.draw(integers(0, 2**32 - 1)))
+    knots = draw.draw(integers(2, 30))
+    gaps = rng.integers(1_000_000, 20_000_000, knots)
+    times = START_NS + np.cumsum(gaps)
+    turn = draw.draw(sampled_from([0.0, 1e-7, 1e-3, 0.3]))
+    rotation = np.cumsum(np.r_[rng.normal(size=(1, 4)), rng.normal(0, turn, (knots - 1, 4))], axis=0)
+    far = draw.draw(sampled_from([0.0, 6e6]))
+    path = Trajectory(times, far + np.cumsum(rng.normal(0, 0.1, (knots, 3)), axis=0), rotation)
+    span = int(times[-1] - times[0])
+    offset = rng.integers(0, span + 1, count).astype(np.uint32)
+    if count and draw.draw(booleans()):
+        offset = np.sort(offset)
+        offset[[0, -1]] = 0, span  # both ends of the trajectory
+    ring = rng.integers(0, 32, count).astype(np.uint8)
+    points = rng.normal(0, 30, (count, 3))
+    points[rng.random(count) < 0.1] = 0.0
+    names = ("range_offset_m", "elevation_offset_rad", "azimuth_offset_rad")
+    corrections = {"range_offset_m": 0.02} | {f"channel_{name}": draw.draw(channel_offsets) for name in names}
+    sweep = Burst(int(times[0]), points, ring, ring, offset)
+    for given_corrections in (None, corrections):
+        np.testing.assert_allclose(
+            deskew_burst(sweep, RIG_FROM_LIDAR, path, given_corrections),
+            deskew_plain(sweep, RIG_FROM_LIDAR, path, given_corrections),
+            rtol=4e-16,
+            atol=2e-12,
         )

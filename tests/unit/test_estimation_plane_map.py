@@ -6,10 +6,10 @@ import small_gicp
 from scipy.spatial.transform import Rotation
 
 from card.estimation import plane_kernels as kernels
-from card.estimation.corrections import correct_points
 from card.estimation.motion_compensation import compensate
 from card.estimation.plane_map import PlaneMap, PlaneSettings
 from card.geometry import apply, inverse, transform
+from card.geometry.corrections import correct_points
 
 LEAF = 1.0
 

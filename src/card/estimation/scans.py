@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from card.errors import CardError
-from card.estimation.corrections import correct_points
 from card.estimation.motion_compensation import compensate
 from card.estimation.strapdown import Path as ImuPath
 from card.geometry import apply, from_json, inverse
+from card.geometry.corrections import correct_points
 from card.recording.laz import read_burst
 
 Array = NDArray[np.float64]
