@@ -1,10 +1,14 @@
 """The drawing of the car."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from card.artifacts import read_json
 from card.errors import CardError
-from card.geometry import apply
+from card.geometry import CameraModel, apply, from_json, inverse
+from card.simulation.drawing import write_drawing
 from card.simulation.rig import LIDARS, built_rig, lidar_elevations_rad, nominal_rig
 from card.simulation.scales import SCALES, scale_named
 
@@ -46,6 +50,26 @@ def test_built_car_stays_near_its_drawing() -> None:
     probe = np.array([[0.0, 10.0, 0.0]])
     for name, pose in drawn.rig_from.items():
         assert np.linalg.norm(apply(pose, probe) - apply(built.rig_from[name], probe)) < 0.25
+
+
+def test_the_drawing_tells_what_is_drawn_and_how_far_off_cars_are_built(tmp_path: Path) -> None:
+    write_drawing(tmp_path / "drawing.json", "demo")
+    drawing = read_json(tmp_path / "drawing.json", "drawing")
+    left = CameraModel.from_json(drawing["cameras"]["camera_left"])
+    assert left == nominal_rig(562, 563).cameras["camera_left"]
+    assert CameraModel.from_json(drawing["camera_left_undistorted"]) == left.undistorted()
+    metres, radians = [], []
+    for seed in range(30):
+        built = built_rig("2026-04-14", seed, 562, 563)
+        for name, pose in built.rig_from.items():
+            drawn = drawing["extrinsics"][f"rig_from_{name}"]
+            offset = inverse(from_json(drawn)) @ pose
+            metres.extend(offset[:3, 3] / drawn["sigma_m"])
+            radians.extend(offset[[2, 0, 1], [1, 2, 0]] / drawn["sigma_rad"])
+        for wheel, drawn in drawing["wheels"].items():
+            metres.extend((built.wheel_contact_m[wheel] - drawn["contact_m"]) / drawn["sigma_m"])
+    assert np.std(metres) == pytest.approx(1, abs=0.1)
+    assert np.std(radians) == pytest.approx(1, abs=0.1)
 
 
 def test_elevations_run_from_top_to_bottom() -> None:

@@ -26,6 +26,21 @@ rule simulate_drive:
         "../scripts/simulate_drive.py"
 
 
+rule simulate_drawing:
+    output:
+        drawing=f"{RAW}/sessions/{{drawing}}.json",
+    log:
+        "logs/simulation/{drawing}.log",
+    # A car of your own has its own drawing there.
+    wildcard_constraints:
+        drawing=one_of(["drawing"] if SIMULATED["sessions"] else []),
+    params:
+        cfg={"scale": SETTINGS["scale"]},
+        code=code("simulate_drawing"),
+    script:
+        "../scripts/simulate_drawing.py"
+
+
 rule simulate_session:
     output:
         bundle=f"{RAW}/sessions/{{simulated}}/calibration.json",

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from card.errors import CardError
 from card.geometry import CameraModel, matrix_from_quaternion, to_json
-from card.simulation.rig import CAMERAS, CHANNELS, WHEELS, LidarCorrections, Rig, built_rig
+from card.simulation.rig import CAMERAS, CHANNELS, WHEELS, LidarCorrections, Rig, built_rig, nominal_rig
 from card.simulation.scales import scale_named
 
 Array = NDArray[np.float64]
@@ -126,7 +126,9 @@ def delivered_calibration(session: str, seed: int, scale: str, views: int) -> di
 
 
 def _document(session: str, rig: Rig, covariances: dict[str, Any], quality: dict[str, Any]) -> dict[str, Any]:
-    undistorted = rig.cameras["camera_left"].undistorted().to_json()
+    # One pinhole for all days, that of the drawing: a mask drawn in it stays valid from session to session.
+    left = rig.cameras["camera_left"]
+    undistorted = nominal_rig(left.width, left.height).cameras["camera_left"].undistorted().to_json()
     return {
         "schema": "calibration",
         "session": {"id": session, "day": day_of(session)[0], "mode": "import"},

@@ -35,6 +35,8 @@ class LidarCorrections:
     channel_azimuth_offset_rad: Array = field(default_factory=lambda: np.zeros(CHANNELS))
 
 
+#: One sigma of what a car is built off its drawing by, each axis.
+BUILT_RAD, BUILT_M = float(np.radians(0.2)), 0.003
 #: One sigma of what a unit's channels are off by, and the most that its maker lets pass.
 _CHANNEL_RAD, _CHANNEL_RAD_MOST = np.radians(0.03), np.radians(0.09)
 _CHANNEL_M, _CHANNEL_M_MOST = 0.0025, 0.005
@@ -119,8 +121,10 @@ def built_rig(day: str, seed: int, width: int, height: int) -> Rig:
     return Rig(
         cameras={name: _built_camera(drawn.cameras[name], rng) for name in CAMERAS},
         rig_from={name: pose @ _misalignment(rng) for name, pose in drawn.rig_from.items()},
-        wheel_center_m={name: xyz + rng.normal(0, 0.003, 3) for name, xyz in drawn.wheel_center_m.items()},
-        wheel_contact_m={name: xyz + rng.normal(0, 0.003, 3) for name, xyz in drawn.wheel_contact_m.items()},
+        wheel_center_m={name: xyz + rng.normal(0, BUILT_M, 3) for name, xyz in drawn.wheel_center_m.items()},
+        wheel_contact_m={
+            name: xyz + rng.normal(0, BUILT_M, 3) for name, xyz in drawn.wheel_contact_m.items()
+        },
         lidar_corrections={name: _lidar_unit(name, seed, rng) for name in LIDARS},
         imu=_imu_unit(seed),
     )
@@ -169,8 +173,8 @@ def _lidar_pose(origin: list[float], tilt_down: float, *, backward: bool) -> Arr
 
 
 def _misalignment(rng: np.random.Generator) -> Array:
-    quaternion = np.concatenate([[1.0], 0.5 * rng.normal(0, np.radians(0.2), 3)])
-    return transform(rng.normal(0, 0.003, 3), quaternion)
+    quaternion = np.concatenate([[1.0], 0.5 * rng.normal(0, BUILT_RAD, 3)])
+    return transform(rng.normal(0, BUILT_M, 3), quaternion)
 
 
 def _built_camera(camera: CameraModel, rng: np.random.Generator) -> CameraModel:
