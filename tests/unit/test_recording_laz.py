@@ -89,6 +89,54 @@ def test_unreadable_laz_is_named(tmp_path: Path) -> None:
             read_burst(path)
 
 
+@pytest.mark.parametrize("version", ["1.2", "1.4"])
+def test_laz_of_others_reads_as_laspy_reads_it(tmp_path: Path, version: str) -> None:
+    """Other versions, scales, orders and more dimensions than ours; several chunks; files in turns."""
+    rng = np.random.default_rng(3)
+    paths = [tmp_path / f"{name}.laz" for name in (5, 6, 7)]
+    for path, count, scale in zip(paths, (120_000, 7, 0), (1e-4, 3e-3, 1e-3), strict=True):
+        header = laspy.LasHeader(version=version, point_format=6 if version == "1.4" else 3)
+        header.scales, header.offsets = np.array([scale, 2 * scale, 5 * scale]), rng.normal(size=3)
+        header.add_extra_dims(
+            [
+                laspy.ExtraBytesParams("offset_ns", np.uint32),
+                laspy.ExtraBytesParams("beam", np.float32),
+                laspy.ExtraBytesParams("ring", np.uint8),
+            ]
+        )
+        las = laspy.LasData(header)
+        las.xyz = rng.uniform(-80, 80, (count, 3))
+        las.intensity = rng.integers(0, 256, count)
+        las.ring, las.offset_ns = rng.integers(0, 32, count), rng.integers(0, 10**8, count)
+        las.write(path)
+    for path in (*paths, *paths):
+        found, wanted = read_burst(path), laspy.read(path)
+        np.testing.assert_array_equal(found.points, wanted.xyz)
+        for name in ("intensity", "ring", "offset_ns"):
+            np.testing.assert_array_equal(getattr(found, name), wanted[name])
+
+
+def test_las_that_is_not_compressed_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / f"{START_NS}.laz"
+    write_burst(path, burst(START_NS))
+    las = laspy.read(path)
+    with path.open("wb") as file:
+        las.write(file, do_compress=False)
+    with pytest.raises(CardError, match=r"unreadable LAZ.*found points are not compressed"):
+        read_burst(path)
+
+
+def test_a_header_that_promises_more_points_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / f"{START_NS}.laz"
+    write_burst(path, burst(START_NS))
+    raw = bytearray(path.read_bytes())
+    for count in (10**6, 2**62):
+        raw[247:255] = count.to_bytes(8, "little")
+        path.write_bytes(raw)
+        with pytest.raises(CardError, match=f"{START_NS}.laz: unreadable LAZ"):
+            read_burst(path)
+
+
 def test_laz_of_others_must_have_our_dimensions(tmp_path: Path) -> None:
     las = laspy.LasData(laspy.LasHeader(version="1.4", point_format=6))
     las.x = np.zeros(3)
