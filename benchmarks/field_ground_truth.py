@@ -22,9 +22,12 @@ from card.recording.paths import LIDARS
 PERIOD_NS = 100_000_000
 
 
-def inputs_of(field: Field) -> Inputs:
-    """What `aggregate` reads of a drive without images: a frame every 100 ms, no ego mask."""
-    folder = field.folder / "ground_truth_inputs"
+def inputs_of(field: Field, folder: Path | None = None) -> Inputs:
+    """What `aggregate` reads of a drive without images: a frame every 100 ms, no ego mask.
+
+    The tables go to `folder`, beside the drive if it is not given.
+    """
+    folder = folder or field.folder / "ground_truth_inputs"
     inputs = Inputs(
         recording=field.recording,
         bursts=folder / "bursts.parquet",
@@ -35,7 +38,7 @@ def inputs_of(field: Field) -> Inputs:
         truth=field.truth,
     )
     if not inputs.ego_mask.is_file():
-        folder.mkdir(exist_ok=True)
+        folder.mkdir(parents=True, exist_ok=True)
         bursts = _bursts(field.recording)
         write_table(inputs.bursts, bursts, "bursts")
         write_table(inputs.frames, _frames(bursts), "frames")

@@ -54,19 +54,19 @@ def write_bursts_table(folder: Path, scratch: Path) -> None:
     write_table(scratch / "bursts.parquet", columns, "bursts")
 
 
-def odometry(folder: Path, scratch: Path) -> None:
-    """Stage 1 of a drive."""
+def odometry(folder: Path, scratch: Path, bursts: Path | None = None) -> None:
+    """Stage 1 of a drive; `bursts` is its table if that is not in `scratch`."""
     estimate_odometry(
-        **_shared(folder, scratch),
+        **_shared(folder, scratch, bursts),
         report=scratch / "odometry.report.json",
         settings=default_settings("odometry"),
     )
 
 
-def batch(folder: Path, scratch: Path) -> None:
-    """Stage 2 of a drive."""
+def batch(folder: Path, scratch: Path, bursts: Path | None = None) -> None:
+    """Stage 2 of a drive; `bursts` as in `odometry`."""
     refine_odometry(
-        **_shared(folder, scratch),
+        **_shared(folder, scratch, bursts),
         trajectory=scratch / "trajectory.parquet",
         nodes=scratch / "nodes.parquet",
         loops=scratch / "loops.parquet",
@@ -77,11 +77,11 @@ def batch(folder: Path, scratch: Path) -> None:
     )
 
 
-def _shared(folder: Path, scratch: Path) -> dict[str, Any]:
+def _shared(folder: Path, scratch: Path, bursts: Path | None) -> dict[str, Any]:
     return {
         "recording": folder / "recording",
         "calibration": folder / "calibration.json",
-        "bursts": scratch / "bursts.parquet",
+        "bursts": bursts or scratch / "bursts.parquet",
         "odometry": scratch / "odometry.parquet",
         "gates": [],
     }
