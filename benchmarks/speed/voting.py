@@ -34,7 +34,7 @@ def rows(scratch: Path, repeats: int) -> list[dict[str, Any]]:
     grid = VoxelGrid.around(drive.trajectory, SETTINGS["voxel_size_m"])
     voxels = build_voxel_map(bursts, drive.origins, grid, SETTINGS)
     chosen = np.flatnonzero(voxels.hit_by_both)
-    sweeps = evidence_sweeps(drive, SETTINGS["flow_baseline_m"], 1)
+    sweeps = evidence_sweeps(drive, SETTINGS)
 
     def votes() -> None:
         visibility_votes(drive, sweeps, voxels, chosen, SETTINGS)

@@ -26,7 +26,7 @@ def test_scores_of_a_static_set(measures):
     grid = VoxelGrid.around(Trajectory([0, 1], np.zeros((2, 3)), [[1, 0, 0, 0]] * 2), 0.1)
     front, rear = np.array([1, 1, 1, 1, 1, 1, 0]), np.array([1, 1, 1, 1, 1, 1, 5])
     counts = np.array([10, 10, 10, 10, 10, 10, 10], np.int32)
-    voxels = VoxelMap(grid, np.arange(7), counts, *[np.zeros(7)] * 2, front, rear, np.zeros(7))
+    voxels = VoxelMap(grid, np.arange(7), counts, *[np.zeros(7)] * 2, front, rear, *[np.zeros(7)] * 3)
     # Two dynamic voxels, one on the edge that is static, three static; the last no front LiDAR hit.
     moving = np.array([10, 6, 5, 0, 0, 0, 10])
     found = static_truth.scores(voxels, moving, np.array([1, 3, 4, 5, 6]))

@@ -62,7 +62,7 @@ def test_compiled_and_plain_agree_on_a_drive(name, tmp_path):
         if field.name != "grid":
             assert np.array_equal(getattr(voxels, field.name), getattr(plain, field.name)), field.name
     chosen = np.flatnonzero(voxels.hit_by_both)
-    every = evidence_sweeps(drive, SETTINGS["flow_baseline_m"], 1)
+    every = evidence_sweeps(drive, SETTINGS)
     sweeps = every[:: max(1, len(every) // SWEEPS)]
     votes = visibility_votes(drive, sweeps, voxels, chosen, SETTINGS)
     wanted = plain_votes(drive, sweeps, voxels, chosen, SETTINGS)

@@ -19,14 +19,14 @@ from card.ground_truth.sweep_registration import MapTarget
 from card.ground_truth.sweeps import Sweep
 from card.ground_truth.visibility_votes import (
     Votes,
-    dynamic_by_visibility,
     evidence_sweeps,
     visibility_votes,
 )
 from card.ground_truth.voxel_map import build_voxel_map
 from card.ground_truth.voxels import VoxelGrid, find, pack, unpack
 
-SETTINGS = default_settings("ground_truth")
+#: Sweeps follow each other every 0.1 s.
+SETTINGS = default_settings("ground_truth") | {"support_margin_s": 0.15}
 GRID = VoxelGrid.around(Trajectory([0, 1], np.zeros((2, 3)), [[1, 0, 0, 0]] * 2), 0.1)
 
 
@@ -73,7 +73,9 @@ def random_drive(seed: int, sweeps: int = 5) -> StandingDrive:
 
 
 def brute_votes(drive, voxels, chosen, surface) -> np.ndarray:
-    votes = np.zeros((3, len(chosen)), dtype=int)
+    votes = np.zeros((4, len(chosen)), dtype=int)
+    found = [np.flatnonzero([(GRID.keys(c) == voxels.keys[v]).any() for c in drive.clouds]) for v in chosen]
+    margin = int(SETTINGS["support_margin_s"] * 1e9)
     for i, cloud in enumerate(drive.clouds):
         occupied = np.unique(GRID.indices(cloud), axis=0)
         lengths = np.linalg.norm(cloud - drive.origins[i], axis=1)
@@ -93,12 +95,17 @@ def brute_votes(drive, voxels, chosen, surface) -> np.ndarray:
             passing = crosses & (aside <= 0.06) & (t >= 1) & (t <= 50) & (lengths - t >= 0.1)
             if not passing.any():
                 continue
+            first, last = drive.end_ns[found[k][[0, -1]]]
+            elsewhen = not first - margin <= drive.end_ns[i] <= last + margin
             if (reach <= 2).any():
                 votes[1, k] += 1
+                votes[3, k] += elsewhen
                 continue
             n = surface.normals[k]
             clear = (np.abs((cloud - c) @ n) > 0.1) & (np.abs(d @ n) > 0.12)
-            votes[2, k] += bool((passing & (lengths - t >= 0.3) & (clear | ~surface.planar[k])).any())
+            moved = (passing & (lengths - t >= 0.3) & (clear | ~surface.planar[k])).any()
+            votes[2, k] += moved
+            votes[3, k] += moved and elsewhen
     return votes
 
 
@@ -114,6 +121,7 @@ def test_plain_votes_equal_a_search_over_all_rays_and_voxels(seed):
     assert votes.hits.tolist() == wanted[0].tolist()
     assert votes.beside.tolist() == wanted[1].tolist()
     assert votes.moved.tolist() == wanted[2].tolist()
+    assert votes.elsewhen.tolist() == wanted[3].tolist()
     assert wanted.sum(axis=1).min() >= 3
 
 
@@ -123,7 +131,7 @@ def assert_same_votes(drive, chosen=None, **changed) -> Votes:
     sweeps = range(len(drive.clouds))
     votes = visibility_votes(drive, sweeps, voxels, chosen, filled)
     plain = plain_votes(drive, sweeps, voxels, chosen, filled)
-    for name in ("hits", "beside", "moved"):
+    for name in ("hits", "beside", "moved", "elsewhen"):
         assert np.array_equal(getattr(votes, name), getattr(plain, name)), name
     return votes
 
@@ -137,7 +145,7 @@ def test_compiled_votes_are_the_plain_ones(seed, place, monkeypatch):
     drive.clouds = [cloud + place for cloud in drive.clouds]
     drive.origins = drive.origins + place
     votes = assert_same_votes(drive)
-    assert min(votes.hits.sum(), votes.beside.sum(), votes.moved.sum()) > 15
+    assert min(votes.hits.sum(), votes.beside.sum(), votes.moved.sum(), votes.elsewhen.sum()) > 15
 
 
 @pytest.mark.parametrize(
@@ -287,18 +295,20 @@ def test_planes_equal_a_loop_over_neighbours():
 
 def test_evidence_sweeps_keep_their_distance_and_thin_a_lidar_at_a_time():
     origins = np.stack([np.arange(12) * 0.3, np.zeros(12), np.zeros(12)], axis=1)
-    drive = SimpleNamespace(origins=origins, front=np.arange(12) % 2 == 0)
+    times = np.arange(12) * 100_000_000
+    drive = SimpleNamespace(origins=origins, front=np.arange(12) % 2 == 0, end_ns=times)
     drive.of = lambda front: np.flatnonzero(drive.front == front)
-    assert evidence_sweeps(drive, 0.5, 1) == list(range(12))
-    assert evidence_sweeps(drive, 1.19, 1) == [0, 1, 4, 5, 8, 9]
-    assert evidence_sweeps(drive, 1.19, 2) == [0, 1, 8, 9]
 
+    def chosen(baseline: float, gap_s: float = 9.0, step: int = 1) -> list[int]:
+        changed = {"flow_baseline_m": baseline, "evidence_gap_s": gap_s, "evidence_step": step}
+        return evidence_sweeps(drive, SETTINGS | changed)
 
-def test_dynamic_by_visibility_allows_more_where_quotas_are_met():
-    votes = Votes(*(np.array(v, dtype=np.int32) for v in ([3, 3, 0, 9], [1, 1, 0, 0], [2, 2, 1, 2])))
-    assert votes.comparisons.tolist() == [6, 6, 1, 11]
-    met = np.array([True, False, False, False])
-    assert dynamic_by_visibility(votes, met, SETTINGS).tolist() == [False, True, False, False]
+    assert chosen(0.5) == list(range(12))
+    assert chosen(1.19) == [0, 1, 4, 5, 8, 9]
+    assert chosen(1.19, step=2) == [0, 1, 8, 9]
+    # Where the car stands, time goes on.
+    assert chosen(99.0) == [0, 1]
+    assert chosen(99.0, gap_s=0.4) == [0, 1, 4, 5, 8, 9]
 
 
 def test_pairs_of_one_lidar_by_distance_and_time():

@@ -23,7 +23,7 @@ _MORE = 2.0
 _STEP = 1e-7
 FLAT = 1e-10
 #: Columns of the votes.
-HIT, BESIDE, MOVED = 0, 1, 2
+HIT, BESIDE, MOVED, ELSEWHEN = 0, 1, 2, 3
 #: What is known of a voxel in one sweep.
 _FREE, _DONE, _UNKNOWN = 1, 2, 0
 
@@ -47,6 +47,7 @@ class Region(NamedTuple):
     world : (3,) grid index, in world, of the block grid's cell (0, 0, 0). offsets: (V, 3) of the centroids.
     chosen : (V,) number of the voxel among those that votes are wanted of, -1 for others.
     normals, planar : (V, 3), (V,) the surface there: 1 planar, 0 not.
+    begin, end : (V,) ns, from when to when the voxel counts as hit.
     returns : (B, 8) scratch: cells with a return of the sweep, all zero between sweeps.
     known : (V,) scratch: 3 x sweep + what is known.
     """
@@ -57,6 +58,8 @@ class Region(NamedTuple):
     chosen: Index
     normals: npt.NDArray[np.float32]
     planar: npt.NDArray[np.int8]
+    begin: Index
+    end: Index
     returns: npt.NDArray[np.uint64]
     known: Index
 
@@ -64,6 +67,7 @@ class Region(NamedTuple):
 @compiled
 def sweep_votes(
     sweep: int,
+    t_ns: int,
     points: Floats,
     origins: Floats,
     size: float,
@@ -71,10 +75,10 @@ def sweep_votes(
     rule: PassRule,
     votes: Ints,
 ) -> None:
-    """Add the votes of one sweep, at most one a voxel, to `votes` (C, 3)."""
+    """Add the votes of one sweep at a time, at most one a voxel, to `votes` (C, 4)."""
     touched = _enter_returns(sweep, points, origins, size, region, rule, votes)
     for i in range(len(points)):
-        _walk(sweep, points[i], origins[i], size, region, rule, votes)
+        _walk(sweep, t_ns, points[i], origins[i], size, region, rule, votes)
     for b in touched:
         region.returns[b] = 0
 
@@ -137,6 +141,7 @@ def _steady(d: float) -> tuple[float, float]:
 @compiled
 def _walk(
     sweep: int,
+    t_ns: int,
     point: Floats,
     origin: Floats,
     size: float,
@@ -179,8 +184,8 @@ def _walk(
                     if (grid.bits[b, i & 7] >> np.uint64(bit)) & np.uint64(1) != 0:
                         v = grid.number[b, i & 7, bit]
                         if region.chosen[v] >= 0 and region.known[v] != 3 * sweep + _DONE:
-                            cell, unit = (i, j, k), (ux, uy, uz)
-                            _look(sweep, v, cell, point, origin, length, unit, size, region, rule, votes)
+                            ray, unit = (point, origin), (ux, uy, uz)
+                            _look(sweep, t_ns, v, (i, j, k), ray, length, unit, size, region, rule, votes)
                 s = max(min((i + fx - ox) * sx, (j + fy - oy) * sy, (k + fz - oz) * sz), s) + _STEP
         t = max(leave, t) + _STEP
 
@@ -188,10 +193,10 @@ def _walk(
 @compiled
 def _look(
     sweep: int,
+    t_ns: int,
     v: int,
     cell: tuple[int, int, int],
-    point: Floats,
-    origin: Floats,
+    ray: tuple[Floats, Floats],
     length: float,
     unit: tuple[float, float, float],
     size: float,
@@ -201,6 +206,7 @@ def _look(
 ) -> None:
     """What a ray that crosses voxel v says of it."""
     x, y, z = cell
+    point, origin = ray
     dx, dy, dz = unit
     wx, wy, wz = x + region.world[0], y + region.world[1], z + region.world[2]
     offset = region.offsets[v]
@@ -220,6 +226,7 @@ def _look(
     if region.known[v] != 3 * sweep + _FREE:
         if _has_return_near(region, x, y, z, rule.near_voxels):
             votes[c, BESIDE] += 1
+            votes[c, ELSEWHEN] += t_ns < region.begin[v] or t_ns > region.end[v]
             region.known[v] = 3 * sweep + _DONE
             return
         region.known[v] = 3 * sweep + _FREE
@@ -231,6 +238,7 @@ def _look(
         if abs(off) <= rule.residual_m or abs(nx * dx + ny * dy + nz * dz) <= rule.incidence:
             return
     votes[c, MOVED] += 1
+    votes[c, ELSEWHEN] += t_ns < region.begin[v] or t_ns > region.end[v]
     region.known[v] = 3 * sweep + _DONE
 
 

@@ -10,10 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from card.artifacts import progress
+from card.ground_truth.dynamic_voxels import attached, contradicted, is_brief, looked_through, seldom_hit
 from card.ground_truth.icp_flow import dynamic_by_flow, flow_votes
 from card.ground_truth.quotas import meets_quotas
 from card.ground_truth.sweeps import Drive
-from card.ground_truth.visibility_votes import dynamic_by_visibility, evidence_sweeps, visibility_votes
+from card.ground_truth.visibility_votes import evidence_sweeps, hit_times, visibility_votes
 from card.ground_truth.voxel_map import VoxelMap, build_voxel_map
 from card.ground_truth.voxels import VoxelGrid
 
@@ -41,7 +42,8 @@ def prune(drive: Drive, voxels: VoxelMap, settings: Mapping[str, Any]) -> Static
     """The voxels of a drive's map that stand still.
 
     With `flow_method` "literal", "submap" or "off" the quotas decide, as in the paper, and the first two
-    prune by ICP flow. With "visibility" a voxel that both LiDARs hit is kept unless its votes contradict it.
+    prune by ICP flow. With "visibility" a voxel that both LiDARs hit is kept unless what sweeps say of it
+    contradicts it (`dynamic_voxels`).
     """
     quotas = meets_quotas(voxels.front_views, voxels.rear_views, voxels.baseline, settings)
     rigid = voxels.extents <= settings["rigidity_m"]
@@ -49,10 +51,9 @@ def prune(drive: Drive, voxels: VoxelMap, settings: Mapping[str, Any]) -> Static
     candidate = (voxels.hit_by_both if method == "visibility" else quotas) & rigid
     chosen = np.flatnonzero(candidate)
     dynamic = np.zeros(len(chosen), dtype=np.bool_)
+    reasons: dict[str, int] = {}
     if method == "visibility":
-        sweeps = evidence_sweeps(drive, settings["flow_baseline_m"], settings["evidence_step"])
-        votes = visibility_votes(drive, progress(sweeps, "moved votes"), voxels, chosen, settings)
-        dynamic = dynamic_by_visibility(votes, quotas[chosen], settings)
+        dynamic, reasons = _dynamic_by_visibility(drive, voxels, chosen, quotas[chosen], settings)
     elif method != "off":
         dynamic = dynamic_by_flow(flow_votes(drive, voxels, settings), settings)[chosen]
     static = chosen[~dynamic]
@@ -61,10 +62,36 @@ def prune(drive: Drive, voxels: VoxelMap, settings: Mapping[str, Any]) -> Static
         "voxels_hit_by_both": int(voxels.hit_by_both.sum()),
         "voxels_quotas_met": int(quotas.sum()),
         "voxels_not_rigid": int((~rigid).sum()),
+        **reasons,
         "voxels_dynamic": int(dynamic.sum()),
         "voxels_static": len(static),
     }
     return StaticSet(voxels.grid, voxels.keys[static], voxels.counts[static], why)
+
+
+def _dynamic_by_visibility(
+    drive: Drive,
+    voxels: VoxelMap,
+    chosen: npt.NDArray[np.int64],
+    quotas_met: npt.NDArray[np.bool_],
+    settings: Mapping[str, Any],
+) -> tuple[npt.NDArray[np.bool_], dict[str, int]]:
+    """Which of the chosen voxels (C,) are dynamic, and how many each test found that none before it did."""
+    sweeps = evidence_sweeps(drive, settings)
+    votes = visibility_votes(drive, progress(sweeps, "moved votes"), voxels, chosen, settings)
+    hit = hit_times(drive, voxels, chosen)
+    brief = is_brief(hit, settings)
+    dynamic, reasons = np.zeros(len(chosen), dtype=np.bool_), {}
+    for reason, found in (
+        ("contradicted", contradicted(votes, quotas_met, settings)),
+        ("looked_through", looked_through(votes, brief, settings)),
+        ("seldom_hit", seldom_hit(votes, settings)),
+    ):
+        reasons[f"voxels_{reason}"] = int((found & ~dynamic).sum())
+        dynamic |= found
+    whole = attached(voxels.keys[chosen], dynamic, brief, hit, settings)
+    reasons["voxels_attached"] = int((whole & ~dynamic).sum())
+    return whole, reasons
 
 
 def _stream(drive: Drive, why: dict[str, int]) -> Iterator[tuple[int, bool, npt.NDArray[np.float64]]]:

@@ -32,11 +32,15 @@ _REACH_M = 20.0
 
 @dataclass(frozen=True)
 class Votes:
-    """Votes of C voxels, at most one a sweep: hits, passes beside a return of the same sweep, moved."""
+    """Votes of C voxels, at most one a sweep: hits, passes beside a return of the same sweep, moved.
+
+    elsewhen: those of the latter two that are of a time at which nothing hit the voxel.
+    """
 
     hits: npt.NDArray[np.int32]
     beside: npt.NDArray[np.int32]
     moved: npt.NDArray[np.int32]
+    elsewhen: npt.NDArray[np.int32]
 
     @property
     def comparisons(self) -> npt.NDArray[np.int32]:
@@ -44,15 +48,23 @@ class Votes:
         return self.hits + self.beside + self.moved
 
 
-def evidence_sweeps(drive: Drive, baseline: float, step: int) -> list[int]:
-    """Of each LiDAR the bursts that lie `baseline` (m) or more from the last one taken; every `step`-th."""
+def evidence_sweeps(drive: Drive, settings: Mapping[str, Any]) -> list[int]:
+    """Of each LiDAR the bursts `flow_baseline_m` or `evidence_gap_s` after the last taken; every `step`-th.
+
+    Where the car stands nothing but time tells apart what moves.
+    """
+    baseline, gap_ns = settings["flow_baseline_m"], settings["evidence_gap_s"] * 1e9
     chosen: list[int] = []
     for front in (True, False):
         taken: list[int] = []
         for i in drive.of(front):
-            if not taken or np.linalg.norm(drive.origins[i] - drive.origins[taken[-1]]) >= baseline:
+            if (
+                not taken
+                or drive.end_ns[i] - drive.end_ns[taken[-1]] >= gap_ns
+                or np.linalg.norm(drive.origins[i] - drive.origins[taken[-1]]) >= baseline
+            ):
                 taken.append(int(i))
-        chosen += taken[::step]
+        chosen += taken[:: settings["evidence_step"]]
     return sorted(chosen)
 
 
@@ -70,11 +82,14 @@ def visibility_votes(
       round the voxel;
     - *moved* if no return is near, a ray passes `moved_gap_m` or more before q and, where the voxel is planar
       (`planes.find_planes`), |n (q - c)| > `flow_residual_m` and |n d| > `planar_min_incidence`;
-    and otherwise nothing. With `register_sweeps` a sweep is first registered to the map, which only its own
+    and otherwise nothing. Of the votes *beside* and *moved* those count as *elsewhen* that lie more than
+    `support_margin_s` before the first or after the last return that any sweep of the drive has of the voxel.
+    With `register_sweeps` a sweep is first registered to the map, which only its own
     votes see. `reference.visibility_votes` is the same in plain numpy.
     """
     rules = _rules(settings)
-    votes = np.zeros((len(chosen), 3), dtype=np.int32)
+    votes = np.zeros((len(chosen), 4), dtype=np.int32)
+    margin_ns = int(settings["support_margin_s"] * 1e9)
     tiles = _Tiles(voxels)
     region, target, centre = None, None, np.full(3, np.inf)
     for i in sweeps:
@@ -85,29 +100,24 @@ def visibility_votes(
         if region is None or np.linalg.norm(origins - centre, axis=1).max() > _REACH_M:
             centre = drive.origins[i]
             near = tiles.within(voxels.grid.indices(centre[None])[0], _radius(voxels, rules))
-            region = _region(voxels, chosen, near, centre, rules)
+            first, last = hit_times(drive, voxels, near)
+            region = _region(voxels, chosen, near, centre, rules, (first - margin_ns, last + margin_ns))
             if settings["register_sweeps"]:
                 centroids = voxels.grid.corners(voxels.keys[near]) + voxels.centroids[near]
                 target = MapTarget(centroids, centre, settings)
         points = sweep.points
         if target is not None:
             points, origins = target.register(points, origins)
-        sweep_votes(i, points, origins, voxels.grid.size, region, rules[0], votes)
+        t_ns = int(drive.end_ns[i])
+        sweep_votes(i, t_ns, points, origins, voxels.grid.size, region, rules[0], votes)
     return Votes(*votes.T)
 
 
-def dynamic_by_visibility(
-    votes: Votes, quotas_met: npt.NDArray[np.bool_], settings: Mapping[str, Any]
-) -> npt.NDArray[np.bool_]:
-    """Which voxels (C,) are dynamic: at least V_dyn moved votes, and a share of the comparisons.
-
-    The quotas (C,) of supplement B say how much contradiction a voxel may take.
-    """
-    share = votes.moved / np.maximum(votes.comparisons, 1)
-    limit = np.where(
-        quotas_met, settings["moved_fraction_quotas_met"], settings["moved_fraction_quotas_missed"]
-    )
-    return (votes.moved >= settings["moved_votes"]) & (share >= limit)
+def hit_times(drive: Drive, voxels: VoxelMap, at: Index) -> tuple[Index, Index]:
+    """Ends (N,), ns, of the first and the last burst with a point in the voxels at positions (N,)."""
+    first = voxels.first[at].astype(np.int64)
+    last = np.minimum(first + voxels.span[at], len(drive.end_ns) - 1)
+    return drive.end_ns[first], drive.end_ns[last]
 
 
 def _rules(settings: Mapping[str, Any]) -> tuple[PassRule, PlaneRule]:
@@ -142,6 +152,7 @@ def _region(
     near: Index,
     centre: npt.NDArray[np.float64],
     rules: tuple[PassRule, PlaneRule],
+    hit: tuple[Index, Index],
 ) -> Region:
     """The voxels at positions `near` in the map, for sweeps within `_REACH_M` of `centre`."""
     size, planes = voxels.grid.size, rules[1]
@@ -162,6 +173,8 @@ def _region(
         chosen=np.where(wanted, at, -1),
         normals=normals,
         planar=planar,
+        begin=hit[0],
+        end=hit[1],
         returns=np.zeros_like(grid.bits),
         known=np.full(len(near), -1, dtype=np.int64),
     )

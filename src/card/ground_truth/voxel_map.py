@@ -25,6 +25,8 @@ class VoxelMap:
     whole 4096ths of a voxel, so that they do not depend on the order of the points.
     front_views, rear_views: (V,) int32 distinct views; counting ends once no quota can fail any more.
     baseline: (V,) float64, metres, of the front views counted.
+    first: (V,) int32 ordinal of the first burst with a point; span: (V,) uint16 bursts from it to the last,
+    at most `voxel_table.MAX_SPAN`.
     """
 
     grid: VoxelGrid
@@ -35,6 +37,8 @@ class VoxelMap:
     front_views: npt.NDArray[np.int32]
     rear_views: npt.NDArray[np.int32]
     baseline: npt.NDArray[np.float64]
+    first: npt.NDArray[np.int32]
+    span: npt.NDArray[np.uint16]
 
     @property
     def hit_by_both(self) -> npt.NDArray[np.bool_]:
@@ -125,6 +129,8 @@ class _State:
             front_views=np.empty(count, dtype=np.int32),
             rear_views=np.empty(count, dtype=np.int32),
             baseline=np.empty(count, dtype=np.float64),
+            first=np.empty(count, dtype=np.int32),
+            span=np.empty(count, dtype=np.uint16),
         )
         # From the end, giving back what is done: the columns and the records never exist together.
         for start in range((count - 1) // _CHUNK * _CHUNK, -1, -_CHUNK):
@@ -138,6 +144,8 @@ class _State:
             out.front_views[to] = part["front_views"]
             out.rear_views[to] = part["rear_views"]
             out.baseline[to] = part["baseline"]
+            out.first[to] = table.first_bursts(part)
+            out.span[to] = part["span"]
             del part
             voxels.resize(start, refcheck=False)
         return out

@@ -13,7 +13,7 @@ from card.ground_truth.rays import ray_origins
 from card.ground_truth.reference.crossed import crossed_voxels
 from card.ground_truth.reference.surface import local_planes
 from card.ground_truth.sweeps import Drive
-from card.ground_truth.visibility_votes import Votes
+from card.ground_truth.visibility_votes import Votes, hit_times
 from card.ground_truth.voxel_map import VoxelMap
 from card.ground_truth.voxels import find, pack, unpack
 
@@ -27,7 +27,9 @@ def visibility_votes(
     """See `ground_truth.visibility_votes.visibility_votes`."""
     keys, size = voxels.keys[chosen], voxels.grid.size
     surface = local_planes(voxels, chosen, settings)
-    votes = Votes(*(np.zeros(len(chosen), dtype=np.int32) for _ in range(3)))
+    votes = Votes(*(np.zeros(len(chosen), dtype=np.int32) for _ in range(4)))
+    first, last = hit_times(drive, voxels, chosen)
+    margin_ns = int(settings["support_margin_s"] * 1e9)
     for i in sweeps:
         sweep = drive.sweep(i)
         if not len(sweep.points):
@@ -70,7 +72,11 @@ def visibility_votes(
             np.abs(_dot(normal, d[passes])) > settings["planar_min_incidence"]
         )
         moved = (length - along >= settings["moved_gap_m"]) & (~surface.planar[place] | clear)
-        votes.moved[np.setdiff1d(place[moved], near)] += 1
+        moved_from = np.setdiff1d(place[moved], near)
+        votes.moved[moved_from] += 1
+        seen, t_ns = np.union1d(near, moved_from), drive.end_ns[i]
+        elsewhen = (t_ns < first[seen] - margin_ns) | (t_ns > last[seen] + margin_ns)
+        votes.elsewhen[seen[elsewhen]] += 1
     return votes
 
 

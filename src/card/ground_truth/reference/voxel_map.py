@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from card.ground_truth.reference.views import distinct_views
 from card.ground_truth.voxel_map import VoxelMap, centroids, extents
+from card.ground_truth.voxel_table import MAX_SPAN
 from card.ground_truth.voxels import OFFSET_STEPS, VoxelGrid
 
 #: Points sorted at once; the result does not depend on it.
@@ -58,6 +59,8 @@ class _State:
         self.keys = np.empty(0, dtype=np.int64)
         self.columns: dict[str, npt.NDArray[Any]] = {
             "count": np.empty(0, dtype=np.int32),
+            "first": np.empty(0, dtype=np.int32),
+            "last": np.empty(0, dtype=np.int32),
             "sum": np.empty((0, 3), dtype=np.int64),
             "low": np.empty((0, 3), dtype=np.int64),
             "high": np.empty((0, 3), dtype=np.int64),
@@ -87,6 +90,8 @@ class _State:
         c["sum"][slots] += np.add.reduceat(offsets, starts)
         c["low"][slots] = np.minimum(c["low"][slots], np.minimum.reduceat(offsets, starts))
         c["high"][slots] = np.maximum(c["high"][slots], np.maximum.reduceat(offsets, starts))
+        c["first"][slots] = np.minimum(c["first"][slots], np.minimum.reduceat(burst, starts))
+        c["last"][slots] = np.maximum(c["last"][slots], np.maximum.reduceat(burst, starts))
         slot_of_point = np.repeat(slots, np.diff(np.r_[starts, len(keys)]))
         first_of_burst = np.r_[True, (keys[1:] != keys[:-1]) | (burst[1:] != burst[:-1])]
         for is_front in (True, False):
@@ -96,7 +101,7 @@ class _State:
     def _grow(self, keys: npt.NDArray[np.int64]) -> None:
         merged = np.union1d(self.keys, keys)
         old = np.searchsorted(merged, self.keys)
-        fills = {"low": OFFSET_STEPS, "high": -1}
+        fills = {"low": OFFSET_STEPS, "high": -1, "first": np.iinfo(np.int32).max, "last": -1}
         for name, column in self.columns.items():
             grown = np.full((len(merged), *column.shape[1:]), fills.get(name, 0), dtype=column.dtype)
             grown[old] = column
@@ -142,4 +147,6 @@ class _State:
             front_views=c["views_front"],
             rear_views=c["views_rear"],
             baseline=c["baseline"],
+            first=c["first"],
+            span=np.minimum(c["last"] - c["first"], MAX_SPAN).astype(np.uint16),
         )

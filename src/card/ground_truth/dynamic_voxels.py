@@ -1,0 +1,89 @@
+"""Which voxels are dynamic by what sweeps say of them: a stated deviation from supplement C."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import product
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from card.ground_truth.visibility_votes import Votes
+from card.ground_truth.voxels import find, pack, unpack
+
+Index = npt.NDArray[np.int64]
+Mask = npt.NDArray[np.bool_]
+
+
+def contradicted(votes: Votes, quotas_met: Mask, settings: Mapping[str, Any]) -> Mask:
+    """Voxels (C,) with V_dyn moved votes or more that are a large share of the comparisons.
+
+    The quotas (C,) of supplement B say how much contradiction a voxel may take.
+    """
+    share = votes.moved / np.maximum(votes.comparisons, 1)
+    limit = np.where(
+        quotas_met, settings["moved_fraction_quotas_met"], settings["moved_fraction_quotas_missed"]
+    )
+    return (votes.moved >= settings["moved_votes"]) & (share >= limit)
+
+
+def seldom_hit(votes: Votes, settings: Mapping[str, Any]) -> Mask:
+    """Voxels (C,) that rays pass `passes_per_hit` times as often as they hit them, and one of them moved.
+
+    Beside what stands still (a walker under a tree) most passes have a return near.
+    """
+    wanted = settings["passes_per_hit"]
+    if not wanted:
+        return np.zeros(len(votes.moved), dtype=np.bool_)
+    seldom: Mask = votes.beside + votes.moved >= wanted * np.maximum(votes.hits, 1)
+    return seldom & (votes.moved >= 1)
+
+
+def is_brief(hit: tuple[Index, Index], settings: Mapping[str, Any]) -> Mask:
+    """Voxels whose first and last returns (C,), (C,) ns, of the drive lie within `brief_s`."""
+    brief: Mask = hit[1] - hit[0] <= settings["brief_s"] * 1e9
+    return brief
+
+
+def looked_through(votes: Votes, brief: Mask, settings: Mapping[str, Any]) -> Mask:
+    """Brief voxels (C,) that `brief_looks` sweeps or more looked through at another time."""
+    if not settings["brief_looks"]:
+        return np.zeros(len(brief), dtype=np.bool_)
+    return brief & (votes.elsewhen >= settings["brief_looks"])
+
+
+def attached(
+    keys: Index, dynamic: Mask, brief: Mask, hit: tuple[Index, Index], settings: Mapping[str, Any]
+) -> Mask:
+    """Dynamic voxels (C,) and the brief ones that belong to them; `reference.attached` is the same, plainly.
+
+    A brief voxel is dynamic if `attached_voxels` dynamic voxels or more in the cube of 2 `near_voxels` + 1
+    round it were hit at the same time: within `attached_gap_s` of each other. What joins may let others join.
+
+    Parameters
+    ----------
+    keys : (C,) increasing. hit : (C,), (C,) ns, first and last return of the drive.
+    """
+    dynamic, least = dynamic.copy(), settings["attached_voxels"]
+    if not least:
+        return dynamic
+    gap, radius = int(settings["attached_gap_s"] * 1e9), settings["near_voxels"]
+    cube = [step for step in product(range(-radius, radius + 1), repeat=3) if any(step)]
+    candidate = np.flatnonzero(brief & ~dynamic)
+    own, (first, last) = keys[candidate], hit
+    count = np.zeros(len(candidate), dtype=np.int64)
+    new = np.flatnonzero(dynamic)
+    while len(new):
+        cells = unpack(keys[new])
+        for step in cube:
+            at = find(own, pack(cells + np.array(step)))
+            other, at = new[at >= 0], at[at >= 0]
+            one = candidate[at]
+            together = (first[other] <= last[one] + gap) & (last[other] >= first[one] - gap)
+            # A step leads to a voxel from one other only.
+            count[at[together]] += 1
+        joins = candidate[count >= least]
+        new = joins[~dynamic[joins]]
+        dynamic[new] = True
+    return dynamic

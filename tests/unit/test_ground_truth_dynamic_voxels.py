@@ -1,0 +1,84 @@
+"""What makes a voxel dynamic, once sweeps have voted."""
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from card.artifacts import default_settings
+from card.ground_truth.dynamic_voxels import attached, contradicted, is_brief, looked_through, seldom_hit
+from card.ground_truth.reference.attached import attached as plain_attached
+from card.ground_truth.visibility_votes import Votes
+from card.ground_truth.voxels import pack
+
+SETTINGS = default_settings("ground_truth")
+S_NS = 1_000_000_000
+
+
+def votes(
+    *, hits: list[int], beside: list[int], moved: list[int], elsewhen: list[int] | None = None
+) -> Votes:
+    columns = (hits, beside, moved, elsewhen or [0] * len(hits))
+    return Votes(*(np.array(column, dtype=np.int32) for column in columns))
+
+
+def test_contradiction_may_be_larger_where_quotas_are_met():
+    some = votes(hits=[3, 3, 0, 9], beside=[1, 1, 0, 0], moved=[2, 2, 1, 2])
+    assert some.comparisons.tolist() == [6, 6, 1, 11]
+    met = np.array([True, False, False, False])
+    assert contradicted(some, met, SETTINGS).tolist() == [False, True, False, False]
+
+
+def test_a_voxel_is_seldom_hit_if_most_sweeps_look_past_it():
+    some = votes(hits=[1, 1, 1, 2, 0], beside=[7, 8, 6, 8, 7], moved=[1, 0, 1, 1, 1])
+    assert seldom_hit(some, SETTINGS).tolist() == [True, False, False, False, True]
+    assert not seldom_hit(some, SETTINGS | {"passes_per_hit": 0}).any()
+
+
+def test_a_brief_voxel_that_is_looked_through_at_other_times_is_dynamic():
+    first = np.array([0, 0, 5 * S_NS])
+    last = first + np.array([4, 5, 0]) * 100_000_000
+    brief = is_brief((first, last), SETTINGS)
+    assert brief.tolist() == [True, False, True]
+    some = votes(hits=[1, 1, 1], beside=[3, 9, 2], moved=[0, 0, 0], elsewhen=[3, 9, 2])
+    assert looked_through(some, brief, SETTINGS).tolist() == [True, False, False]
+    assert not looked_through(some, brief, SETTINGS | {"brief_looks": 0}).any()
+
+
+def row_of_voxels(dynamic: list[int], seconds: list[float]) -> tuple:
+    """Voxels side by side along z, each hit at one instant."""
+    count = len(dynamic)
+    keys = pack(np.stack([np.full(count, 9), np.full(count, 9), 9 + np.arange(count)], axis=1))
+    at = (np.array(seconds) * S_NS).astype(np.int64)
+    return keys, np.array(dynamic, bool), np.ones(count, bool), (at, at)
+
+
+def test_what_is_hit_together_with_dynamic_voxels_joins_them_one_after_the_other():
+    keys, dynamic, brief, hit = row_of_voxels([1, 1, 0, 0, 0, 0], [0, 0, 0.1, 0.1, 0.2, 0.9])
+    assert attached(keys, dynamic, brief, hit, SETTINGS).tolist() == [True] * 5 + [False]
+    brief[3] = False
+    assert attached(keys, dynamic, brief, hit, SETTINGS).tolist() == [True] * 3 + [False] * 3
+    assert attached(keys, dynamic, brief, hit, SETTINGS | {"attached_voxels": 0}).sum() == 2
+    assert dynamic.sum() == 2
+
+
+@settings(max_examples=80, deadline=None)
+@given(
+    st.lists(
+        st.tuples(
+            *[st.integers(0, 7)] * 3, st.booleans(), st.booleans(), st.integers(0, 9), st.integers(0, 3)
+        ),
+        min_size=0,
+        max_size=80,
+        unique_by=lambda voxel: voxel[:3],
+    ),
+    st.integers(1, 4),
+    st.sampled_from([1, 2]),
+)
+def test_attached_voxels_are_those_of_the_plain_rounds(voxels, least, radius):
+    table = np.array(sorted(voxels), dtype=np.int64).reshape(-1, 7)
+    keys, dynamic, brief = pack(table[:, :3] + 50), table[:, 3] > 0, table[:, 4] > 0
+    hit = table[:, 5] * 100_000_000, (table[:, 5] + table[:, 6]) * 100_000_000
+    filled = SETTINGS | {"attached_voxels": least, "near_voxels": radius}
+    found = attached(keys, dynamic, brief, hit, filled)
+    assert np.array_equal(found, plain_attached(keys, dynamic, brief, hit, filled))
+    assert not (found & ~dynamic & ~brief).any()
