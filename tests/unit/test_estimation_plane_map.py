@@ -34,6 +34,17 @@ def trunks(seed: int = 0) -> np.ndarray:
     return np.stack([x, y, height], axis=2).reshape(-1, 3)
 
 
+def rings(sensor: np.ndarray, seed: int) -> np.ndarray:
+    """What 32 channels turning 2 m over flat ground see of it and of the trunks, in the sensor (4, 4)."""
+    rng = np.random.default_rng(seed)
+    azimuth, down = np.meshgrid(np.arange(0, 2 * np.pi, 0.006), np.radians(np.arange(3.5, 17.0)))
+    rough = rng.normal(0, 0.002, azimuth.shape)
+    far = (2.0 + rough) / np.tan(down)
+    ground = np.stack([far * np.sin(azimuth), far * np.cos(azimuth), rough - 2.0], axis=2).reshape(-1, 3)
+    wood = trunks(seed) * (2.0, 2.0, 1.0) - (0.0, 0.0, 2.0)
+    return np.concatenate([ground, apply(inverse(sensor), wood)])
+
+
 def small_pose(seed: int, turn: float, shift: float) -> np.ndarray:
     rng = np.random.default_rng(seed)
     pose = np.eye(4)
@@ -140,6 +151,17 @@ def test_in_a_wood_without_planes_trunks_hold_the_scan() -> None:
     assert np.linalg.norm((found.map_from_scan - true)[:2, 3]) < 0.02
     assert found.inlier_fraction < 0.5
     assert found.score > 0.5
+
+
+def test_rings_on_flat_ground_do_not_hold_a_scan_back() -> None:
+    true = transform([0.03, 0.7, 0.0], [np.cos(0.004), 0, 0, np.sin(0.004)])
+    grid = PlaneMap(PlaneSettings(leaf_m=LEAF))
+    grid.insert(kernels.voxel_means(rings(np.eye(4), 1), 0.1))
+    scan = kernels.voxel_means(rings(true, 2), 0.5)
+    for guess in (np.eye(4), transform([0.0, 1.4, 0.0], [1.0, 0, 0, 0.03])):
+        found = grid.register(scan, guess, iterations=30, widen=10.0).map_from_scan
+        assert np.linalg.norm((found - true)[:2, 3]) < 0.05
+        assert np.degrees(Rotation.from_matrix(found[:3, :3].T @ true[:3, :3]).magnitude()) < 0.2
 
 
 def test_what_is_out_of_reach_is_forgotten() -> None:

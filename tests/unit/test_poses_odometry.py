@@ -6,11 +6,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from street_scene import START_NS, Street, houses, standing, swaying, tunnel
 
 from card.artifacts import default_settings, read_json, read_table, write_table
 from card.errors import CardError
+from card.estimation.imu import read_imu
+from card.estimation.odometry import rehearsed
 from card.estimation.scans import Scans
+from card.estimation.smoother import State
 from card.geometry import Trajectory, inverse
 from card.poses.estimate_odometry import estimate_odometry
 from card.recording.laz import read_burst, write_burst
@@ -82,6 +86,24 @@ def test_a_drive_that_starts_in_motion_is_followed_to_millimetres(street: Street
     assert np.hypot(last["vx"], last["vy"]) == pytest.approx(6.0, abs=0.02)
     np.testing.assert_allclose([last[f"gyro_bias_{a}"] for a in "xyz"], street.gyro_bias, atol=3e-4)
     assert report["notes"] == []
+
+
+def test_a_start_that_scans_alone_tell_poorly_is_mended_by_a_rehearsal(street: Street, folder: Path) -> None:
+    settings = default_settings("odometry")
+    scans = _scans(folder, read_table(folder / "bursts.parquet", "bursts"))
+    opening = [scans[i] for i in range(20)]
+    t_ns = opening[0].end_ns
+    before, pose, after = street.poses(np.array([t_ns - 1_000_000, t_ns, t_ns + 1_000_000]))
+    velocity = pose[:3, :3].T @ (after - before)[:3, 3] / 2e-3
+    up = pose[2, :3]
+    wrong = Rotation.from_rotvec([0.06, -0.08, 0.0]).apply(-9.81 * up)
+    slow = velocity - np.array([0.3, 0.5, 0.1])
+    start = State(t_ns, np.eye(4), slow, np.zeros(3), np.zeros(3), wrong)
+    imu = read_imu(read_table(folder / "imu.parquet", "imu"))
+    found = rehearsed(opening, start, imu, settings)
+    assert found.t_ns == t_ns
+    assert np.linalg.norm(found.velocity - velocity) < 0.2 * np.linalg.norm(slow - velocity)
+    assert np.linalg.norm(found.gravity + 9.81 * up) < 0.2 * np.linalg.norm(wrong + 9.81 * up)
 
 
 def test_the_same_drive_gives_the_same_bytes(folder: Path) -> None:

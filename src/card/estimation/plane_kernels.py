@@ -20,6 +20,8 @@ UNKNOWN, IS_PLANE, IS_BLOB = 0.0, 1.0, 2.0
 BLOB_SIGMA = 0.05
 #: A plane is fitted anew when its voxel has grown by this share.
 GROWTH = 1.1
+#: Of a line, the second eigenvalue is less than this share of the first; it is steep from this sine on.
+LINE, STEEP = 0.05, 0.5
 _BIAS, _BITS = 1 << 20, 21
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 _SWEEPS = 8
@@ -168,6 +170,11 @@ def fit_planes(
         flat = plane[THIN] < max_thickness**2 and plane[MIDDLE] > min_spread**2
         if flat and low != high:
             plane[VALID] = IS_PLANE
+            continue
+        # A ring of the sensor on flat ground lies where the sensor is, not where the ground has a mark: it
+        # would hold a moving scan back. A pole is a line too, but a steep one.
+        if plane[MIDDLE] < LINE * scatter[high, high] and abs(vectors[2, high]) < STEEP:
+            plane[VALID] = UNKNOWN
             continue
         plane[VALID] = IS_BLOB
         column = BLOB

@@ -92,9 +92,17 @@ class Smoother:
         self._insert(values, predicted, velocity, bias)
         t_ns = int(imu.t_ns[-1])
         self._smoother.update(graph, values, self._stamps(t_ns))
+        self.state = self._state(k, t_ns)
+        return self.state
+
+    def first(self) -> State:
+        """The first state, as all since then tell of it; for a lag that has not run out."""
+        return self._state(0, self._t0)
+
+    def _state(self, k: int, t_ns: int) -> State:
         found = self._smoother.calculateEstimate()
         bias = found.atConstantBias(B(k))
-        self.state = State(
+        return State(
             t_ns,
             found.atPose3(X(k)).matrix(),
             np.asarray(found.atVector(V(k))),
@@ -102,7 +110,6 @@ class Smoother:
             np.asarray(bias.accelerometer()),
             self._magnitude * np.asarray(found.atUnit3(G(0)).point3()),
         )
-        return self.state
 
     def _insert(
         self, values: gtsam.Values, pose: Array, velocity: Array, bias: gtsam.imuBias.ConstantBias
