@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from road_walls import across_walls
+from tyre_ground import ground_under
 
 from card.artifacts import read_json, read_table
 from card.geometry import Trajectory, apply, inverse
@@ -39,7 +39,7 @@ def wheel_errors(wheel_excitation: Path, trajectory: Path, truth: Path) -> Wheel
     """Errors of all wheels' contacts, each in its own trajectory's rig.
 
     In rig, because that is what the excitation is for: the road under the sensors. Drift of the whole
-    trajectory is a figure of the poses. truth : with wheels.parquet, trajectory.parquet and world.npz.
+    trajectory is a figure of the poses. The road is the surface that the sensors saw. truth : with wheels.parquet, trajectory.parquet and world.npz.
     """
     wheels = read_json(wheel_excitation, "wheel_excitation")["wheels"]
     found_path, true_path = (
@@ -58,13 +58,15 @@ def wheel_errors(wheel_excitation: Path, trajectory: Path, truth: Path) -> Wheel
         _, ours, theirs = np.intersect1d(t_ns, true_t, assume_unique=True, return_indices=True)
         height = apply(inverse(found_path.at(t_ns[ours])), found[ours])[:, 2]
         true_rig = true_path.at(true_t[theirs])
-        true_height = apply(inverse(true_rig), true[theirs])[:, 2]
+        ground = ground_under(truth / "world.npz", true[theirs], true_rig[:, :2, 1])
+        on_ground = np.column_stack([true[theirs, :2], ground.height])
+        true_height = apply(inverse(true_rig), on_ground)[:, 2]
         parts.append(
             WheelErrors(
                 1e3 * (height - true_height),
                 np.array(wheels[wheel]["gap"])[ours],
                 np.array(wheels[wheel]["uncertain"])[ours],
-                across_walls(truth / "world.npz", true[theirs], true_rig[:, :2, 1]),
+                ground.wall,
             )
         )
     return WheelErrors.joined(parts)

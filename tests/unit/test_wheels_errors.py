@@ -8,7 +8,7 @@ import pytest
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
 from accuracy.wheels import figures
-from road_walls import across_walls
+from tyre_ground import ground_under
 from wheel_errors import WheelErrors
 
 
@@ -27,11 +27,20 @@ def test_a_wall_is_steeper_than_45_degrees(tmp_path: Path, run_m: float, expecte
     y = np.linspace(3, 7, 400)
     contacts = np.stack([np.zeros_like(y), y, np.where(y < 5, 0, -0.1)], axis=1)
     forward = np.tile([0.0, 2.0], (len(y), 1))
-    crossed = across_walls(ground(tmp_path / "world.npz", run_m), contacts, forward)
+    crossed = ground_under(ground(tmp_path / "world.npz", run_m), contacts, forward).wall
     over = (y > 5 - 0.1) & (y < 5 + run_m + 0.1)
     away = (y < 5 - 0.14) | (y > 5 + run_m + 0.14)
     assert crossed[over].all() == expected
     assert not crossed[away].any()
+
+
+def test_the_truth_is_the_mean_under_the_footprint(tmp_path: Path) -> None:
+    """Over the foot of a slope of 1:2, whatever height the contact was said to have."""
+    y = np.linspace(4.7, 5.3, 13)
+    contacts = np.stack([np.zeros_like(y), y, np.full_like(y, 0.03)], axis=1)
+    found = ground_under(ground(tmp_path / "world.npz", 0.2), contacts, np.tile([0.0, 1.0], (len(y), 1)))
+    along = y[:, None] + (np.arange(2000) + 0.5) / 2000 * 0.24 - 0.12
+    np.testing.assert_allclose(found.height, np.interp(along, [5, 5.2], [0, -0.1]).mean(axis=1), atol=1e-4)
 
 
 def test_walls_and_flagged_samples_do_not_count_with_the_rest() -> None:

@@ -1,5 +1,6 @@
-"""Where a tyre's footprint lies across a wall: the edge of a pothole, a kerb."""
+"""The ground under a tyre's footprint: its mean height, and whether it is a wall: a pothole's edge, a kerb."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,24 +21,43 @@ STEP_M = 0.01
 CONTACTS_AT_ONCE = 2000
 
 
-def across_walls(world: Path, contacts: Array, forward: Array) -> NDArray[np.bool_]:
-    """Whether the footprint (N,) at contacts (N, 3) heading along `forward` (N, 2) crosses a wall.
+@dataclass(frozen=True)
+class TyreGround:
+    """Under each of N footprints: the surface's mean height, m in world, and whether it has a wall."""
 
-    world : ``world.npz`` of the truth. A tyre is not a point, so what is right at such an edge is a matter of
-    definition: these samples are reported apart.
+    height: Array
+    wall: NDArray[np.bool_]
+
+
+def ground_under(world: Path, contacts: Array, forward: Array) -> TyreGround:
+    """The ground under footprints at contacts (N, 3) heading along `forward` (N, 2).
+
+    world : ``world.npz`` of the truth, the surface that the sensors saw. The road it was meshed from is some
+    tenths of a millimetre lower where a rut or a rough spot is rounder than the mesh. A tyre is not a point,
+    so what is right across a wall is a matter of definition: these samples are reported apart.
     """
     arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(contacts[:, :2], axis=0), axis=1))])
     _, asked, answer = np.unique(np.floor(arc / STEP_M), return_index=True, return_inverse=True)
-    scene, crossed = _scene(world), np.zeros(len(asked), dtype=np.bool_)
+    scene, above, wall = _scene(world), np.zeros(len(asked)), np.zeros(len(asked), dtype=np.bool_)
+    along, over = (_trapezoid(rays) for rays in RAYS)
     for start in range(0, len(asked), CONTACTS_AT_ONCE):
-        some = asked[start : start + CONTACTS_AT_ONCE]
+        block = slice(start, start + CONTACTS_AT_ONCE)
+        some = asked[block]
         heights = _heights(scene, contacts[some], forward[some])
         slopes = [
             np.abs(np.diff(heights, axis=axis)).max(axis=(1, 2)) / (length / (rays - 1))
             for axis, length, rays in zip((1, 2), FOOTPRINT_M, RAYS, strict=True)
         ]
-        crossed[start : start + CONTACTS_AT_ONCE] = np.maximum(*slopes) > WALL_SLOPE
-    return crossed[answer]
+        wall[block] = np.maximum(*slopes) > WALL_SLOPE
+        above[block] = np.einsum("nab,a,b->n", heights, along, over) - contacts[some, 2]
+    return TyreGround(contacts[:, 2] + above[answer], wall[answer])
+
+
+def _trapezoid(count: int) -> Array:
+    """Weights (count,) of evenly spaced values in their mean."""
+    weights = np.ones(count)
+    weights[[0, -1]] = 0.5
+    return weights / weights.sum()
 
 
 def _heights(scene: Any, contacts: Array, forward: Array) -> Array:
