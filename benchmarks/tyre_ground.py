@@ -1,4 +1,4 @@
-"""The ground under a tyre's footprint: its mean height, and whether it is a wall: a pothole's edge, a kerb."""
+"""The ground under a tyre's footprint: its mean height, and whether it has a wall, as at a pothole's edge."""
 
 from dataclasses import dataclass
 from pathlib import Path

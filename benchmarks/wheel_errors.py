@@ -39,7 +39,9 @@ def wheel_errors(wheel_excitation: Path, trajectory: Path, truth: Path) -> Wheel
     """Errors of all wheels' contacts, each in its own trajectory's rig.
 
     In rig, because that is what the excitation is for: the road under the sensors. Drift of the whole
-    trajectory is a figure of the poses. The road is the surface that the sensors saw. truth : with wheels.parquet, trajectory.parquet and world.npz.
+    trajectory is a figure of the poses. The road is the surface that the sensors saw.
+
+    truth : with wheels.parquet, trajectory.parquet and world.npz.
     """
     wheels = read_json(wheel_excitation, "wheel_excitation")["wheels"]
     found_path, true_path = (

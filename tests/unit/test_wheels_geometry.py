@@ -7,7 +7,8 @@ from scipy.spatial.transform import Rotation
 
 from card.artifacts import default_settings
 from card.geometry import Trajectory
-from card.wheels.arc_height import Corridor, RoadPoints, corridor_points, project
+from card.wheels import arc_height
+from card.wheels.arc_height import Corridor, RoadPoints, project
 from card.wheels.contact_path import ContactPath, contact_path
 from card.wheels.profile import SplineSettings
 from card.wheels.wheel_fit import Excitation, QualitySettings, fit_excitation
@@ -39,6 +40,18 @@ def fit(path: ContactPath, road: RoadPoints, **changes: float) -> Excitation:
     spline = SplineSettings(**{name: defaults[name] for name in SplineSettings.__dataclass_fields__})
     quality = QualitySettings(**{name: defaults[name] for name in QualitySettings.__dataclass_fields__})
     return fit_excitation(path, road, spline, quality, defaults["footprint_m"])
+
+
+def corridor_points(
+    points: Array, path: ContactPath, window: tuple[float, float], sides: Corridor
+) -> RoadPoints:
+    """The corridor's points, found both ways."""
+    fast, which = arc_height.corridor_points(points, path, window, sides)
+    plain, same = arc_height.corridor_points(points, path, window, sides, compiled=False)
+    np.testing.assert_array_equal(which, same)
+    for name in RoadPoints.__dataclass_fields__:
+        np.testing.assert_array_equal(getattr(fast, name), getattr(plain, name))
+    return fast
 
 
 def level(arc: Array, height: float) -> RoadPoints:
@@ -129,6 +142,20 @@ def test_a_second_pass_keeps_its_own_points() -> None:
     np.testing.assert_allclose(second.height, [0], atol=1e-9)
     first = corridor_points(point, path, (0.1 * lap, 0.4 * lap), Corridor(0.12, 0.35))
     np.testing.assert_allclose(first.height, [0.05], atol=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_compiled_and_plain_corridors_are_the_same(seed: int) -> None:
+    """Forward, back and forward over a swaying path, in windows that cut it anywhere."""
+    rng = np.random.default_rng(seed)
+    y = np.concatenate([np.linspace(0, 12, 200), np.linspace(12, 5, 150), np.linspace(5, 15, 180)])
+    t = np.arange(len(y)) / 100
+    euler = np.stack([0.1 * np.sin(t), 0.02 * np.sin(2 * t), 0.03 * np.sin(1.5 * t)], axis=1)
+    path = contact_path(trajectory(y, heave=0.02 * np.sin(5 * t), euler_zxy=euler), CONTACT, STEP_M)
+    points = path.position[rng.integers(0, len(y), 3000)] + rng.normal(0, [0.15, 0.3, 0.25], (3000, 3))
+    first = rng.uniform(-2, 20)
+    found = corridor_points(points, path, (first, first + rng.uniform(1, 15)), Corridor(0.12, 0.35, 0.17))
+    assert 100 < len(found) < 8000
 
 
 def test_a_run_that_ends_still_has_its_footprint() -> None:

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from card.geometry import Trajectory, apply, inverse
+from card.estimation.deskew import deskew_plain
+from card.geometry import Trajectory, apply, inverse, transform
 from card.recording.burst import Burst
-from card.recording.laz import write_burst
+from card.recording.laz import read_burst, write_burst
 from card.wheels.arc_height import Corridor, corridor_points
 from card.wheels.contact_path import contact_path
-from card.wheels.samples import BurstFile, Cutter, Lidar, collect_samples
+from card.wheels.corridor_kernels import near_cells
+from card.wheels.samples import BurstFile, Cutter, Lidar, collect_samples, spaced_bursts
 from card.wheels.static_points import StaticVoxels
 
 START_NS = 1_776_153_600_000_000_000
@@ -63,9 +65,71 @@ def test_a_burst_that_is_cropped_keeps_its_own_end(tmp_path: Path, deskewed: boo
     )
     burst = BurstFile("lidar_front", t_ns, tmp_path / f"{t_ns}.laz")
     (found,) = collect_samples([burst], cutter, threads=1)
-    wanted = corridor_points(world, contact, (0.0, 30.0), corridor)
+    wanted, _ = corridor_points(world, contact, (0.0, 30.0), corridor)
     assert len(wanted) == 200
     # Stored to 0.1 mm.
     np.testing.assert_allclose(found.arc, wanted.arc, atol=2e-4)
     np.testing.assert_allclose(found.sideways, wanted.sideways, atol=2e-4)
     np.testing.assert_allclose(found.height, wanted.height, atol=2e-4)
+
+
+def test_cut_points_are_those_of_the_plain_way(tmp_path: Path) -> None:
+    """Reference: nothing cropped, every point deskewed, static ones first, nearest poses by a tree."""
+    rng = np.random.default_rng(4)
+    path = trajectory()
+    rig_from_lidar = transform(
+        [0.1, 0.5, 0.2], Rotation.from_euler("ZX", [0.3, -0.02]).as_quat()[[3, 0, 1, 2]]
+    )
+    offset = np.sort(rng.integers(0, 100_000_000, 20_000)).astype(np.uint32)
+    t_ns = START_NS + 1_500_000_000
+    world = rng.uniform([-1.5, 0, -0.5], [1.5, 16, 0.5], (20_000, 3))
+    sensor = apply(inverse(path.at(t_ns + offset.astype(np.int64)) @ rig_from_lidar), world)
+    ring = rng.integers(0, 32, 20_000).astype(np.uint8)
+    write_burst(tmp_path / f"{t_ns}.laz", Burst(t_ns, sensor, ring, ring, offset))
+    names = ("range_offset_m", "elevation_offset_rad", "azimuth_offset_rad")
+    corrections = {f"channel_{name}": rng.normal(0, 1e-3, 32).tolist() for name in names}
+    corrections |= {"range_offset_m": 0.01}
+    ids = np.unique(np.floor(world[::3] / VOXEL_M).astype(np.int32), axis=0)
+    static = StaticVoxels({"origin": np.zeros(3), "voxel_size": np.float64(VOXEL_M), "ids": ids})
+    corridor, reach_m = Corridor(0.12, 0.35, 0.17), 6.0
+    paths = [contact_path(path, contact, 0.05) for contact in ([0.8, 1.0, -1.7], [-0.8, -1.5, -1.7])]
+    lidar = Lidar(rig_from_lidar, corrections, False)
+    cutter = Cutter({"lidar_front": lidar}, path, paths, static, 1, corridor, reach_m)
+    found = cutter.cut([BurstFile("lidar_front", t_ns, tmp_path / f"{t_ns}.laz")])
+
+    points = deskew_plain(read_burst(tmp_path / f"{t_ns}.laz"), rig_from_lidar, path, corrections)
+    points = points[static.near(points, 1)]
+    for road, wheel in zip(found, paths, strict=True):
+        arc = float(wheel.arc_at(t_ns))
+        plain, _ = corridor_points(points, wheel, (arc - reach_m, arc + reach_m), corridor, compiled=False)
+        assert 100 < len(plain) == len(road)
+        for name in ("arc", "sideways", "height"):
+            np.testing.assert_allclose(getattr(road, name), getattr(plain, name), rtol=0, atol=1e-10)
+
+
+def test_cells_near_a_place_are_its_own_and_those_beside() -> None:
+    rng = np.random.default_rng(5)
+    seen, points = rng.uniform(-4, 4, (30, 2)), rng.uniform(-7, 7, (5000, 3))
+    cells, places = np.floor(points[:, :2] / 0.6), np.floor(seen / 0.6)
+    wanted = (np.abs(cells[:, None] - places).max(axis=2) <= 1).any(axis=1)
+    np.testing.assert_array_equal(near_cells(points, seen, 0.6), wanted)
+    assert 0.1 < wanted.mean() < 0.9
+
+
+def test_bursts_are_a_step_apart_and_none_is_read_while_the_car_stands() -> None:
+    t = np.arange(0, 8, 0.01)
+    y = np.interp(t, [0, 2, 4, 6, 8], [0, 10, 10, 4, 4])  # 5 m/s, stands, back at 3 m/s, stands
+    position = np.stack([np.zeros_like(t), y, np.full_like(t, 1.7)], axis=1)
+    still = np.tile([1.0, 0, 0, 0], (len(t), 1))
+    path = contact_path(
+        Trajectory(START_NS + np.round(t * 1e9).astype(np.int64), position, still), [0.8, 1.0, -1.7], 0.05
+    )
+    starts = START_NS + np.arange(0, 78) * 100_000_000
+    bursts = [BurstFile(lidar, int(s), Path("b")) for s in starts for lidar in ("lidar_front", "lidar_rear")]
+    kept = spaced_bursts(bursts, path, 1.0)
+    for lidar in ("lidar_front", "lidar_rear"):
+        arc = path.arc_at([burst.t_start_ns for burst in kept if burst.lidar == lidar])
+        assert arc[0] == 0
+        assert np.diff(arc).min() >= 1.0
+        assert np.diff(arc).max() < 1.0 + 0.5 + 1e-6
+        assert len(arc) == 11 + 5  # every 1.0 m to 10 m, every 1.2 m back

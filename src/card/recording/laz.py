@@ -25,8 +25,9 @@ SCALE_M = 1e-4
 _EXTRA = {"ring": np.dtype(np.uint8), "offset_ns": np.dtype(np.uint32)}
 # The header wants a date; a constant one keeps the bytes a function of the burst alone.
 _CREATION_DATE = date(2000, 1, 1)
-#: Bytes of a header that tell of the points and not of their form: counts and bounds (LAS 1.4, table 3).
-_HEADER_BYTES = 227
+#: Bytes of a header that tell of the points and not of their form: counts and bounds (LAS 1.4, table 3), also
+#: 64 to 112 of each descriptor of extra bytes (table 24).
+_HEADER_BYTES, _RECORD_BYTES, _EXTRA_BYTES = 227, 54, (b"LASF_Spec", 4)
 _SUMMARY, _SUMMARY_1_4 = [(107, 131), (179, 227)], (247, 375)
 _UNREADABLE = (
     laspy.errors.LaspyException,
@@ -121,7 +122,7 @@ class _Layout:
 
     def records(self, raw: bytes, count: int) -> npt.NDArray[np.void]:
         """The points (count,) as they are stored."""
-        found = np.zeros(count, dtype=self.record)
+        found = np.empty(count, dtype=self.record)
         if count:
             source = io.BytesIO(raw)
             source.seek(self.start)
@@ -140,10 +141,16 @@ def _opened(raw: bytes) -> tuple[_Layout, int]:
     """The layout of a file and how many points it has."""
     if len(raw) < _HEADER_BYTES:
         raise ValueError("header is cut off")
-    (start,) = struct.unpack_from("<I", raw, 96)
+    at, start, records = struct.unpack_from("<HII", raw, 94)
     head = bytearray(raw[:start])
-    at = [*_SUMMARY, _SUMMARY_1_4] if raw[25] >= 4 else _SUMMARY
-    for first, last in at:
+    told = [*_SUMMARY, _SUMMARY_1_4] if raw[25] >= 4 else list(_SUMMARY)
+    for _ in range(records):
+        user, number, length = struct.unpack_from("<16sHH", raw, at + 2)
+        at += _RECORD_BYTES
+        if (user.rstrip(b"\0"), number) == _EXTRA_BYTES:
+            told += [(at + d + 64, at + d + 112) for d in range(0, length, 192)]
+        at += length
+    for first, last in told:
         head[first:last] = bytes(last - first)
     (count,) = struct.unpack_from("<Q", raw, 247) if raw[25] >= 4 else struct.unpack_from("<I", raw, 107)
     return _layout(bytes(head)), count

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from card.wheels.contact_path import ContactPath
+from card.wheels.corridor_kernels import nearest_poses
 
 Array = NDArray[np.float64]
 
@@ -22,14 +23,19 @@ class Corridor:
     overhang_m: float = 0.0
 
 
-def project(points: Array, position: Array, rotation: Array, arc: Array) -> tuple[Array, Array, Array]:
+def project(
+    points: Array, position: Array, rotation: Array, arc: Array, nearest: NDArray[np.int64] | None = None
+) -> tuple[Array, Array, Array]:
     """Arc length d_p, height h_p and sideways offset of points, each (P,), in metres.
 
     points : (P, 3) world. position, rotation, arc : (M, 3), (M, 3, 3), (M,) poses of the path, M >= 2.
+    nearest : (P,) index of the pose nearest to each point, if it is known.
+
     Supplement, "Wheel Excitation": alpha, d_p and h_p between the two closest adjacent poses; the offset is
     the x component where h_p is the z component.
     """
-    _, nearest = cKDTree(position).query(points)
+    if nearest is None:
+        _, nearest = cKDTree(position).query(points)
     before, after = np.maximum(nearest - 1, 0), np.minimum(nearest + 1, len(position) - 1)
     distance_before = np.linalg.norm(points - position[before], axis=1)
     distance_after = np.linalg.norm(points - position[after], axis=1)
@@ -74,20 +80,26 @@ class RoadPoints:
 
 
 def corridor_points(
-    points: Array, path: ContactPath, window: tuple[float, float], corridor: Corridor
-) -> RoadPoints:
-    """The points (P, 3) in world that lie in the corridor of one pass.
+    points: Array,
+    path: ContactPath,
+    window: tuple[float, float],
+    corridor: Corridor,
+    compiled: bool = True,
+) -> tuple[RoadPoints, NDArray[np.int64]]:
+    """The points (P, 3) in world that lie in the corridor of one pass, and which they are (Q,).
 
     The pass is the piece of path with arc lengths in `window`, so that a street driven twice keeps its two
-    passes apart. Runs forward and in reverse over the same ground each take the points.
+    passes apart. Runs forward and in reverse over the same ground each take the points. compiled : whether
+    nearest poses are found in machine code; the plain form gives the same points.
     """
-    found = []
+    found, which = [RoadPoints.joined([])], [np.zeros(0, dtype=np.int64)]
     for run, first, last in _runs(path, window):
         piece = slice(first, last + 1)
-        arc = path.knot_arc[piece]
-        position = path.knot_position[piece]
-        near = _near(points, position, corridor)
-        d, h, sideways = project(points[near], position, path.knot_rotation[piece], arc)
+        arc, position = path.knot_arc[piece], path.knot_position[piece]
+        reach = _reach(position, corridor)
+        nearest = nearest_poses(points, position, reach) if compiled else _nearest(points, position, reach)
+        near = np.flatnonzero(nearest >= 0)
+        d, h, sideways = project(points[near], position, path.knot_rotation[piece], arc, nearest[near])
         inside = (np.abs(sideways) <= corridor.half_width_m) & (np.abs(h) <= corridor.max_height_m)
         # The footprint of a wheel that stands at the end of a run reaches beyond it.
         low, high = path.ends(run)
@@ -95,23 +107,26 @@ def corridor_points(
             d <= min(high + corridor.overhang_m, window[1])
         )
         found.append(RoadPoints(d, sideways, h, np.full(len(d), run)).part(inside))
-    return RoadPoints.joined(found)
+        which.append(near[inside])
+    return RoadPoints.joined(found), np.concatenate(which)
 
 
-def _near(points: Array, position: Array, corridor: Corridor) -> NDArray[np.bool_]:
-    """Which of the points (P, 3) are so near to the poses (M, 3) that they can be in the corridor."""
+def _reach(position: Array, corridor: Corridor) -> float:
+    """How far from the nearest of the poses (M, 3) a point of the corridor can be, metres."""
     steps = np.linalg.norm(np.diff(position, axis=0), axis=1)
-    reach = np.hypot(corridor.half_width_m, corridor.max_height_m) + corridor.overhang_m + steps.max()
-    low, high = position.min(axis=0) - reach, position.max(axis=0) + reach
-    near: NDArray[np.bool_] = ((points >= low) & (points <= high)).all(axis=1)
-    distance, _ = cKDTree(position).query(points[near], distance_upper_bound=reach)
-    near[near] = np.isfinite(distance)
-    return near
+    return float(np.hypot(corridor.half_width_m, corridor.max_height_m) + corridor.overhang_m + steps.max())
+
+
+def _nearest(points: Array, position: Array, reach_m: float) -> NDArray[np.int64]:
+    """See `corridor_kernels.nearest_poses`."""
+    distance, nearest = cKDTree(position).query(points, distance_upper_bound=reach_m)
+    return np.where(np.isfinite(distance), nearest, -1)
 
 
 def _runs(path: ContactPath, window: tuple[float, float]) -> Iterator[tuple[int, int, int]]:
     """Each run of segments that touches the window, with its first and last knot in there."""
-    touching = np.flatnonzero((path.knot_arc[1:] >= window[0]) & (path.knot_arc[:-1] <= window[1]))
-    for run in np.unique(path.run[touching]):
-        segments = touching[path.run[touching] == run]
+    first = max(int(np.searchsorted(path.knot_arc, window[0], side="left")) - 1, 0)
+    last = int(np.searchsorted(path.knot_arc, window[1], side="right"))
+    for run in np.unique(path.run[first:last]):
+        segments = first + np.flatnonzero(path.run[first:last] == run)
         yield int(run), int(segments[0]), int(segments[-1]) + 1

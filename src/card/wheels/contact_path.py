@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -37,12 +38,12 @@ class ContactPath:
     segment: Indices
     run: Indices
 
-    @property
+    @cached_property
     def knot_position(self) -> Array:
         """Contact points (M, 3) of the knots, metres in world."""
         return self.position[self.knots]
 
-    @property
+    @cached_property
     def knot_rotation(self) -> Array:
         """Rotations world_from_rig (M, 3, 3) of the knots."""
         return self.rotation[self.knots]
@@ -51,7 +52,11 @@ class ContactPath:
         """Arc lengths (...) in metres at times (...) in nanoseconds."""
         # Differences first: nanoseconds since 1970 do not fit a float64.
         since = np.asarray(t_ns, dtype=np.int64) - self.t_ns[0]
-        return np.interp(since, self.t_ns - self.t_ns[0], self.arc)
+        return np.interp(since, self._since, self.arc)
+
+    @cached_property
+    def _since(self) -> Indices:
+        return self.t_ns - self.t_ns[0]
 
     def ends(self, run: int) -> tuple[float, float]:
         """Arc lengths at which a run begins and ends, metres."""
@@ -67,8 +72,12 @@ class ContactPath:
         return (1 - alpha) * z[i - 1] + alpha * z[i]
 
     def _knots(self, run: int) -> tuple[int, int]:
-        segments = np.flatnonzero(self.run == run)
-        return int(segments[0]), int(segments[-1]) + 1
+        # Runs are numbered along the path.
+        first, last = (
+            np.searchsorted(self.run, run, side="left"),
+            np.searchsorted(self.run, run, side="right"),
+        )
+        return int(first), int(last)
 
     def surface(self, arc: ArrayLike, height: ArrayLike) -> Array:
         """Points (..., 3) in world at arc lengths (...) and heights (...) over the path, both metres.

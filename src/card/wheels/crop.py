@@ -1,7 +1,7 @@
 """The few points of a raw burst that can lie in a wheel corridor, found before anything is transformed."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from card.geometry import Trajectory, apply, inverse
 from card.recording.burst import Burst
 from card.wheels.contact_path import ContactPath
+from card.wheels.corridor_kernels import near_cells
 
 Array = NDArray[np.float64]
 Window = tuple[float, float]
@@ -18,11 +19,30 @@ PATH_STEP_M = 0.2
 LOOKS = 5
 
 
+@dataclass(frozen=True)
+class Track:
+    """Points (T, 3) in world every `PATH_STEP_M` along a contact path."""
+
+    points: Array
+
+    @classmethod
+    def of(cls, path: ContactPath) -> "Track":
+        """The track of a path, to the end of it."""
+        arc = np.arange(0.0, path.knot_arc[-1] + PATH_STEP_M, PATH_STEP_M)
+        arc = np.minimum(arc, path.knot_arc[-1])
+        return cls(path.surface(arc, np.zeros_like(arc)))
+
+    def within(self, window: Window) -> Array:
+        """Those inside an arc window and one more on either side; at least one."""
+        first = min(max(int(np.floor(window[0] / PATH_STEP_M)), 0), len(self.points) - 1)
+        return self.points[first : int(np.ceil(window[1] / PATH_STEP_M)) + 1]
+
+
 def crop_burst(
     burst: Burst,
     rig_from_lidar: Array,
     trajectory: Trajectory,
-    paths: Sequence[ContactPath],
+    tracks: Sequence[Track],
     windows: Sequence[Window],
 ) -> Burst:
     """The points of a burst whose x, y in the sensor frame are near a path, seen from anywhere in the sweep.
@@ -30,19 +50,11 @@ def crop_burst(
     Coarse on purpose: the paths inside their arc windows are marked on a grid as the sensor sees them at
     some times of the sweep, widened by a cell. Keeps every corridor point up to 40 m/s.
     """
-    track = np.concatenate([_track(path, window) for path, window in zip(paths, windows, strict=True)])
+    track = np.concatenate([track.within(window) for track, window in zip(tracks, windows, strict=True)])
     times = np.linspace(0, burst.end_ns - burst.t_ns, LOOKS).astype(np.int64) + burst.t_ns
     lidar_from_world = inverse(trajectory.at(times) @ rig_from_lidar)
     seen = np.concatenate([apply(look, track)[:, :2] for look in lidar_from_world])
-    cells = np.floor(seen / CELL_M).astype(np.int64)
-    low = cells.min(axis=0) - 1
-    grid = np.zeros(cells.max(axis=0) - low + 2, dtype=bool)
-    for dx in (-1, 0, 1):
-        for dy in (-1, 0, 1):
-            grid[cells[:, 0] - low[0] + dx, cells[:, 1] - low[1] + dy] = True
-    at = np.floor(burst.points[:, :2] / CELL_M).astype(np.int64) - low
-    near = np.all((at >= 0) & (at < grid.shape), axis=1)
-    near[near] = grid[at[near, 0], at[near, 1]]
+    near = np.flatnonzero(near_cells(burst.points, seen, CELL_M))
     return replace(
         burst,
         points=burst.points[near],
@@ -50,10 +62,3 @@ def crop_burst(
         ring=burst.ring[near],
         offset_ns=burst.offset_ns[near],
     )
-
-
-def _track(path: ContactPath, window: Window) -> Array:
-    """Points (T, 3) of a path every `PATH_STEP_M` inside an arc window."""
-    arc = np.arange(max(window[0], 0.0), min(window[1], path.knot_arc[-1]) + PATH_STEP_M, PATH_STEP_M)
-    arc = np.minimum(arc, path.knot_arc[-1])
-    return path.surface(arc, np.zeros_like(arc))

@@ -22,7 +22,7 @@ from card.wheels.arc_height import Corridor
 from card.wheels.contact_path import contact_path
 from card.wheels.profile import SplineSettings
 from card.wheels.road_plane import RoadPlanes
-from card.wheels.samples import BurstFile, Cutter, Lidar, collect_samples, moving_bursts
+from card.wheels.samples import BurstFile, Cutter, Lidar, collect_samples, spaced_bursts
 from card.wheels.static_points import StaticVoxels
 from card.wheels.tables import excitation_document, frame_planes, plane_columns
 from card.wheels.wheel_fit import Excitation, QualitySettings, fit_excitation
@@ -68,7 +68,7 @@ def excite(
         for name in WHEELS
     }
     description = read_description(recording)
-    files = moving_bursts(_burst_files(bursts, recording), paths["fl"], settings["min_step_m"])
+    files = spaced_bursts(_burst_files(bursts, recording), paths["fl"], settings["burst_step_m"])
     cutter = Cutter(
         _lidars(bundle, description),
         path,

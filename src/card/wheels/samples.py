@@ -1,7 +1,8 @@
 """Road points under each wheel, streamed out of the bursts."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from card.geometry import Trajectory
 from card.recording.laz import read_burst
 from card.wheels.arc_height import Corridor, RoadPoints, corridor_points
 from card.wheels.contact_path import ContactPath
-from card.wheels.crop import crop_burst
+from card.wheels.crop import Track, crop_burst
 from card.wheels.static_points import StaticVoxels
 
 Array = NDArray[np.float64]
@@ -41,16 +42,16 @@ class BurstFile:
     file: Path
 
 
-def moving_bursts(bursts: Iterable[BurstFile], path: ContactPath, min_step_m: float) -> list[BurstFile]:
+def spaced_bursts(bursts: Sequence[BurstFile], path: ContactPath, burst_step_m: float) -> list[BurstFile]:
     """The bursts before which the wheel moved a step since the last one kept of the same LiDAR.
 
     A standing car sees the same points over and over.
     """
     last: dict[str, float] = {}
     kept = []
-    for burst in bursts:
-        arc = float(path.arc_at(burst.t_start_ns))
-        if burst.lidar not in last or arc - last[burst.lidar] >= min_step_m:
+    arcs = path.arc_at([burst.t_start_ns for burst in bursts]).tolist()
+    for burst, arc in zip(bursts, arcs, strict=True):
+        if burst.lidar not in last or arc - last[burst.lidar] >= burst_step_m:
             last[burst.lidar] = arc
             kept.append(burst)
     return kept
@@ -71,26 +72,24 @@ class Cutter:
     corridor: Corridor
     arc_window_m: float
 
-    def cut(self, bursts: Iterable[BurstFile]) -> list[RoadPoints]:
+    def cut(self, bursts: Sequence[BurstFile]) -> list[RoadPoints]:
         """Each wheel's corridor points of the bursts."""
         pieces: list[list[RoadPoints]] = [[] for _ in self.paths]
-        for entry in bursts:
-            arcs = [float(path.arc_at(entry.t_start_ns)) for path in self.paths]
-            windows = [(arc - self.arc_window_m, arc + self.arc_window_m) for arc in arcs]
-            points = self._static_points(entry, windows)
-            if len(points):
-                for piece, path, window in zip(pieces, self.paths, windows, strict=True):
-                    piece.append(corridor_points(points, path, window, self.corridor))
+        arcs = np.stack([path.arc_at([entry.t_start_ns for entry in bursts]) for path in self.paths], axis=1)
+        for entry, arc in zip(bursts, arcs.tolist(), strict=True):
+            windows = [(at - self.arc_window_m, at + self.arc_window_m) for at in arc]
+            points = self._near_points(entry, windows)
+            for piece, path, window in zip(pieces, self.paths, windows, strict=True):
+                road, which = corridor_points(points, path, window, self.corridor)
+                piece.append(road.part(self.static.near(points[which], self.static_reach)))
         return [RoadPoints.joined(piece) for piece in pieces]
 
-    def _static_points(self, entry: BurstFile, windows: Sequence[tuple[float, float]]) -> Array:
-        """World points (P, 3) of a burst near the paths and the static voxels."""
+    def _near_points(self, entry: BurstFile, windows: Sequence[tuple[float, float]]) -> Array:
+        """World points (P, 3) of a burst near the paths."""
         lidar = self.lidars[entry.lidar]
         whole = read_burst(entry.file)
-        burst = crop_burst(whole, lidar.rig_from_lidar, self.trajectory, self.paths, windows)
-        if len(burst) == 0:
-            return np.zeros((0, 3))
-        points = deskew_burst(
+        burst = crop_burst(whole, lidar.rig_from_lidar, self.trajectory, self._tracks, windows)
+        return deskew_burst(
             burst,
             lidar.rig_from_lidar,
             self.trajectory,
@@ -98,7 +97,10 @@ class Cutter:
             motion_compensate=not lidar.deskewed,
             end_ns=whole.end_ns,
         )
-        return points[self.static.near(points, self.static_reach)]
+
+    @cached_property
+    def _tracks(self) -> list[Track]:
+        return [Track.of(path) for path in self.paths]
 
 
 def collect_samples(bursts: Sequence[BurstFile], cutter: Cutter, threads: int) -> list[RoadPoints]:

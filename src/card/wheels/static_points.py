@@ -1,12 +1,22 @@
 """Which points lie in the static voxels of a sequence."""
 
 from collections.abc import Mapping
+from functools import cache
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
+from card.wheels.corridor_kernels import any_among
+
 Array = NDArray[np.float64]
+
+
+@cache
+def _steps(reach: int) -> NDArray[np.int64]:
+    """The steps (S, 3) to the voxels at most `reach` off, the near ones first."""
+    steps = product(range(-reach, reach + 1), repeat=3)
+    return np.array(sorted(steps, key=lambda step: (np.abs(step).sum(), step)), dtype=np.int64)
 
 
 class StaticVoxels:
@@ -20,19 +30,20 @@ class StaticVoxels:
         self._extent = ids.max(axis=0) - self._low + 1 if len(ids) else np.zeros(3, dtype=np.int64)
         self._keys = np.sort(self._key(ids - self._low))
 
-    def near(self, points: Array, reach: int) -> NDArray[np.bool_]:
+    def near(self, points: Array, reach: int, compiled: bool = True) -> NDArray[np.bool_]:
         """Whether each of the points (N, 3), metres in world, lies at most `reach` voxels off a static one.
 
-        A reach of 0 is the voxel set itself; 1 also takes the voxels that touch it.
+        A reach of 0 is the voxel set itself; 1 also takes the voxels that touch it. compiled : whether they
+        are looked up in machine code; the plain form finds the same.
         """
         voxel = np.floor((points - self._origin) / self._size).astype(np.int64) - self._low
-        steps = sorted(
-            product(range(-reach, reach + 1), repeat=3), key=lambda step: (np.abs(step).sum(), step)
-        )
+        steps = _steps(reach)
+        if compiled:
+            return np.asarray(any_among(voxel, steps, self._extent, self._keys))
         found = np.zeros(len(points), dtype=bool)
         for step in steps:
             missing = np.flatnonzero(~found)
-            found[missing] = self._contain(voxel[missing] + np.array(step))
+            found[missing] = self._contain(voxel[missing] + step)
         return found
 
     def _contain(self, voxel: NDArray[np.int64]) -> NDArray[np.bool_]:
