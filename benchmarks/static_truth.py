@@ -1,37 +1,58 @@
 """The static voxel set of a simulated drive against what each of its points really met."""
 
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from card.artifacts import progress, read_arrays
 from card.ground_truth.sweeps import Drive
-from card.ground_truth.voxel_map import VoxelMap
-from card.ground_truth.voxels import find
-from card.recording.laz import read_burst
+from card.ground_truth.voxel_map import VoxelMap, build_voxel_map
+from card.ground_truth.voxels import VoxelGrid, find
+from card.recording.burst import Burst
 
 #: DUFOMap's own defaults for 10 cm voxels: inflation of hits (m) and of the unknown (voxels).
 DUFOMAP = {"resolution": 0.1, "d_s": 0.2, "d_p": 2}
 
 
-def moving_points(drive: Drive, truth: Path, i: int) -> NDArray[np.bool_]:
-    """(N,) whether each point of sweep `i` moves. truth : folder of the drive's truth."""
-    file = truth / "bursts" / drive.sensor(i) / f"{drive.files[i].stem}.npz"
-    dynamic = read_arrays(file, "truth_burst")["dynamic"]
-    # Each point has a firing time of its own.
-    return dynamic[np.isin(read_burst(drive.files[i]).time_ns, drive.sweep(i).time_ns)]
+class TrueDrive(Drive):
+    """A drive that knows which of its points move. truth : folder of the drive's truth."""
+
+    def __init__(self, truth: Path, *arguments: Any) -> None:
+        self._truth = truth / "bursts"
+        self._moving: dict[int, NDArray[np.bool_]] = {}
+        super().__init__(*arguments)
+
+    def moving(self, i: int) -> NDArray[np.bool_]:
+        """(N,) whether each point of sweep `i` moves."""
+        if i not in self._moving:
+            self._read(i)
+        return self._moving[i]
+
+    def _takes_part(self, i: int, burst: Burst) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        real, inside = super()._takes_part(i, burst)
+        file = self._truth / self.sensor(i) / f"{self.files[i].stem}.npz"
+        self._moving[i] = read_arrays(file, "truth_burst")["dynamic"][real & inside]
+        return real, inside
 
 
-def moving_counts(drive: Drive, truth: Path, voxels: VoxelMap) -> NDArray[np.int64]:
-    """(V,) points of each voxel that move."""
+def map_of(drive: TrueDrive, settings: Mapping[str, Any]) -> tuple[VoxelMap, NDArray[np.int64]]:
+    """The voxel map of a drive, and how many points (V,) of each voxel move."""
+    grid = VoxelGrid.around(drive.trajectory, settings["voxel_size_m"])
+    moving = []
+
+    def bursts() -> Iterator[tuple[int, bool, NDArray[np.float64]]]:
+        for i in progress(range(len(drive)), "map"):
+            points = drive.sweep(i).points
+            moving.append(grid.keys(points[drive.moving(i)]))
+            yield i, bool(drive.front[i]), points
+
+    voxels = build_voxel_map(bursts(), drive.origins, grid, settings)
     counts = np.zeros(len(voxels.keys), dtype=np.int64)
-    for i in progress(range(len(drive)), "truth"):
-        moving = moving_points(drive, truth, i)
-        if moving.any():
-            keys = voxels.grid.keys(drive.sweep(i).points[moving])
-            np.add.at(counts, find(voxels.keys, keys), 1)
-    return counts
+    np.add.at(counts, find(voxels.keys, np.concatenate(moving)), 1)
+    return voxels, counts
 
 
 def scores(voxels: VoxelMap, moving: NDArray[np.int64], static: NDArray[np.int64]) -> dict[str, float]:
@@ -39,6 +60,7 @@ def scores(voxels: VoxelMap, moving: NDArray[np.int64], static: NDArray[np.int64
 
     A voxel is dynamic if most of its points are. SA, DA: share of static voxels kept and of dynamic ones
     removed. AA, HA: their geometric and harmonic mean. point_DA: share of the moving points removed.
+    dynamic_pct: share of the points of kept voxels that move.
     """
     both = voxels.hit_by_both
     kept = (find(static, voxels.keys) >= 0)[both]
@@ -51,6 +73,7 @@ def scores(voxels: VoxelMap, moving: NDArray[np.int64], static: NDArray[np.int64
         "AA": float(np.sqrt(sa * da)),
         "HA": float(2 * sa * da / (sa + da)),
         "point_DA": float(100 * moving[~kept].sum() / moving.sum()),
+        "dynamic_pct": float(100 * moving[kept].sum() / counts[kept].sum()),
     }
 
 

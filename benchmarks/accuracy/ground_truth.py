@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ground_truth_figures import ABLATION, Inputs, frame_figures, static_figures
+from ground_truth_figures import ABLATION, FRAME_ABLATION, FRAME_SCORES, Inputs, Measured
 from mesh_truth import Mesh
 from numpy.typing import NDArray
 
@@ -13,7 +13,7 @@ from card.artifacts import read_arrays, read_json, read_table
 from card.geometry import Trajectory, apply, from_json
 
 #: Figure: aim, unit, which side is better.
-FIGURES = {
+FIGURES: dict[str, tuple[float | None, str, str]] = {
     "surface_median_mm": (2.0, "mm", "lower"),
     "surface_p95_mm": (8.0, "mm", "lower"),
     "surface_median_mm_end_to_end": (5.0, "mm", "lower"),
@@ -30,6 +30,9 @@ FIGURES = {
     "points_per_frame": (500_000.0, "1", "higher"),
     "coverage_pct": (None, "%", "higher"),
     **{f"{score}_{name}": (None, "%", "higher") for name in ABLATION for score in ("SA", "DA")},
+}
+FIGURES |= {
+    f"{score}_{name}": (None, *FIGURES[score][1:]) for name in FRAME_ABLATION for score in FRAME_SCORES
 }
 #: Frames a sequence whose points are compared with the mesh, evenly spaced.
 FRAMES = 8
@@ -83,9 +86,16 @@ def figures(work: Path, truth: Path, sequence: str) -> dict[str, float]:
         ego_mask=results / "ego_mask.png",
         trajectory=truth / sequence / "trajectory.parquet",
         truth=truth / sequence,
+        true_calibration=true_calibration,
     )
     mesh = Mesh(truth / sequence / "world.npz")
-    return released(results, inputs, mesh) | static_figures(inputs) | frame_figures(inputs, mesh, FRAMES)
+    true = Measured(inputs)
+    return {
+        **released(results, inputs, mesh),
+        **true.static_figures(dufomap=True),
+        **true.frame_figures(mesh, FRAMES),
+        **true.ablation(mesh, FRAMES),
+    }
 
 
 def released(results: Path, inputs: Inputs, mesh: Mesh) -> dict[str, float]:

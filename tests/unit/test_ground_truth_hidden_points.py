@@ -86,3 +86,18 @@ def test_a_speck_of_static_points_does_not_shrink_the_sphere():
 def test_a_point_beyond_the_sphere_is_refused():
     with pytest.raises(CardError, match="too far away"):
         visible_points(cloud(6), 1.0)
+
+
+def test_hidden_point_removal_can_be_one_pass_or_off():
+    static, key = cloud(1), cloud(2, 80)
+    own = np.arange(len(static)) % 5 == 0
+    D = 1.5 * diagonal(static)
+    off = two_pass_visibility(static, own, key, D, SETTINGS | {"hidden_point_removal": "off"})
+    assert [len(part) for part in off] == [len(static), (~own).sum(), len(key)]
+    once = two_pass_visibility(static, own, key, D, SETTINGS | {"hidden_point_removal": "one_pass"})
+    both = np.concatenate([static[~own], key])
+    seen = visible_points(both, SETTINGS["hpr_first"] * D)
+    assert len(once[0]) == len(static)
+    found = np.concatenate([static[once[1]], key[once[2]]])
+    assert np.array_equal(found, both[seen])
+    assert len(found) < len(both)

@@ -18,6 +18,7 @@ def test_both_forms_by_hand():
     literal = mad_inliers(voxel, points, 1.5, "literal", 2)
     assert deviation.tolist() == [True] * 6 + [False] * 2
     assert literal.tolist() == [True] * 2 + [False] * 6
+    assert mad_inliers(voxel, points, 1.5, "off", 9).all()
 
 
 def test_a_voxel_with_too_few_inliers_is_dropped():

@@ -98,7 +98,7 @@ def path(origin, frames, speed):
     block=st.sampled_from([1, 4, 50]),
     options=st.fixed_dictionaries(
         {
-            "mad_form": st.sampled_from(["deviation", "literal"]),
+            "mad_form": st.sampled_from(["deviation", "literal", "off"]),
             "points_per_voxel": st.sampled_from([0, 1, 3]),
             "min_lidars_per_voxel": st.sampled_from([1, 2]),
             "mad_min_inliers": st.sampled_from([1, 2, 5]),

@@ -29,7 +29,8 @@ def two_pass_visibility(
     Pass 1 tests the static cloud at R = hpr_first D. Pass 2 tests its survivors together with the whole
     keyframe at R = hpr_second D. `diameter` is D, metres: the diagonal of the frame's whole static cloud,
     not of what is left of it in view. A static point that belongs to the keyframe's burst (`is_keyframe`,
-    (N,)) enters pass 2 only as a keyframe point.
+    (N,)) enters pass 2 only as a keyframe point. With `hidden_point_removal` "one_pass" pass 1 tests both
+    together and is all there is, with "off" everything counts as seen.
 
     Returns
     -------
@@ -39,10 +40,16 @@ def two_pass_visibility(
     if max(_reach(static), _reach(keyframe)) >= settings["hpr_first"] * D:
         # At a sequence's end hardly anything may be static; then the keyframe and the viewer count too.
         D = diagonal(np.concatenate([static, keyframe, np.zeros((1, 3))]))
-    first = visible_points(static, settings["hpr_first"] * D, workspace)
+    passes = settings["hidden_point_removal"]
+    first = np.arange(len(static))
+    if passes == "two_pass":
+        first = visible_points(static, settings["hpr_first"] * D, workspace)
     again = first[~is_keyframe[first]]
     both = np.concatenate([static[again], keyframe])
-    second = visible_points(both, settings["hpr_second"] * D, workspace)
+    if passes == "off":
+        return first, again, np.arange(len(keyframe))
+    radius = settings["hpr_second" if passes == "two_pass" else "hpr_first"] * D
+    second = visible_points(both, radius, workspace)
     return first, again[second[second < len(again)]], second[second >= len(again)] - len(again)
 
 

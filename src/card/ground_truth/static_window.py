@@ -112,6 +112,7 @@ class StaticWindow:
             near,
             settings["mad_multiplier"],
             settings["mad_form"] == "literal",
+            settings["mad_form"] == "off",
             settings["mad_min_inliers"],
             settings["points_per_voxel"],
             take("place", most, np.int64),

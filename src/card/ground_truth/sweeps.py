@@ -21,7 +21,7 @@ from card.recording.laz import read_burst
 from card.recording.paths import LIDARS
 
 FRONT, REAR = LIDARS
-#: World points kept between passes; a short drive is then read only once.
+#: World points kept between passes over the drive; a short one is then read only once.
 CACHE_POINTS = 30_000_000
 
 
@@ -76,7 +76,7 @@ class Drive:
         poses = trajectory.at(self.end_ns)
         self.origins = np.einsum("bij,bj->bi", poses[:, :3, :3], rig_origins.reshape(-1, 3)) + poses[:, :3, 3]
         self._cache: OrderedDict[int, Sweep] = OrderedDict()
-        self._cached_points, self._limit = 0, CACHE_POINTS
+        self._cached_points, self._limit, self._sliding = 0, CACHE_POINTS, False
 
     def __len__(self) -> int:
         return len(self.files)
@@ -99,22 +99,28 @@ class Drive:
             self._cache.move_to_end(i)
             return self._cache[i]
         sweep = self._read(i)
-        self._cache[i] = sweep
-        self._cached_points += len(sweep.points)
-        self.keep(self._limit)
+        # What one pass over a long drive leaves would be pushed out before the next pass comes to it.
+        if self._sliding or self._cached_points + len(sweep.points) <= self._limit:
+            self._cache[i] = sweep
+            self._cached_points += len(sweep.points)
+            self._push_out()
         return sweep
 
     def keep(self, points: int) -> None:
-        """From now on keep no more than this many world points in memory: those last asked for."""
-        self._limit = points
-        while self._cached_points > points and len(self._cache) > 1:
+        """From now on keep no more than this many world points in memory: those last asked for.
+
+        Until then passes over the whole drive are expected, and what comes first is kept.
+        """
+        self._limit, self._sliding = points, True
+        self._push_out()
+
+    def _push_out(self) -> None:
+        while self._cached_points > self._limit and len(self._cache) > 1:
             self._cached_points -= len(self._cache.popitem(last=False)[1].points)
 
     def _read(self, i: int) -> Sweep:
         burst, lidar = read_burst(self.files[i]), self.sensor(i)
-        real = np.linalg.norm(burst.points, axis=1) >= self._settings["min_range_m"]
-        mode = self._settings["front_crop" if self.front[i] else "rear_crop"]
-        inside = _crop(burst.points, mode, self._rig_from[lidar])
+        real, inside = self._takes_part(i, burst)
         keep = real & inside
         part = replace(
             burst,
@@ -125,6 +131,12 @@ class Drive:
         )
         world = self._world(part, lidar, int(self.end_ns[i]))
         return Sweep(world, part.time_ns, part.ring, int((~real).sum()), int((real & ~inside).sum()))
+
+    def _takes_part(self, i: int, burst: Burst) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
+        """Points (N,) of burst `i` that are not at the sensor's origin, and those that the crop keeps."""
+        real = np.linalg.norm(burst.points, axis=1) >= self._settings["min_range_m"]
+        mode = self._settings["front_crop" if self.front[i] else "rear_crop"]
+        return real, _crop(burst.points, mode, self._rig_from[self.sensor(i)])
 
     def _world(self, burst: Burst, lidar: str, end_ns: int) -> npt.NDArray[np.float64]:
         return deskew_burst(

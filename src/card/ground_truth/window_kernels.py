@@ -157,6 +157,7 @@ def clean(
     near: Any,
     multiplier: float,
     literal: bool,
+    off: bool,
     min_inliers: int,
     limit: int,
     place: Any,
@@ -203,11 +204,11 @@ def clean(
                 sorted_[k] = abs(radius[k] - median)
                 if not literal:
                     radius[k] = sorted_[k]
-            largest = factor * _median(sorted_, count)
+            largest = np.float32(np.inf) if off else factor * _median(sorted_, count)
             total = 0
             for k in range(count):
                 total += radius[k] <= largest
-            if total < min_inliers:
+            if total < min_inliers and not off:
                 total = 0
             share = min(limit, total) if limit > 0 else total
             rank = 0

@@ -21,7 +21,8 @@ def mad_inliers(
 
     With r the distance to the mean of the voxel's points, m the median of r and MAD the median of
     |r - m|, `form` "deviation" (main text) keeps |r - m| <= multiplier MAD and "literal" (supplement)
-    keeps r <= multiplier MAD. Voxels with fewer than `min_inliers` such points lose all of them.
+    keeps r <= multiplier MAD. Voxels with fewer than `min_inliers` such points lose all of them. "off" keeps
+    every point.
 
     Parameters
     ----------
@@ -30,8 +31,8 @@ def mad_inliers(
 
     Radii and deviations are float32.
     """
-    if not len(voxel):
-        return np.zeros(0, dtype=np.bool_)
+    if not len(voxel) or form == "off":
+        return np.ones(len(voxel), dtype=np.bool_)
     order, starts, counts = runs_by_voxel(voxel)
     ordered = points[order].astype(np.float64)
     group = np.repeat(np.arange(len(starts)), counts)
