@@ -14,7 +14,7 @@ from card.estimation.imu import Imu, ImuNoise
 from card.estimation.lidar_only import scan_trajectory
 from card.estimation.plane_kernels import voxel_means
 from card.estimation.plane_map import PlaneMap, PlaneSettings, Registration
-from card.estimation.scans import Scan, Scans
+from card.estimation.scans import Scan, Sweeps
 from card.estimation.smoother import Smoother, State
 from card.estimation.start import SIGMAS, start_state
 from card.estimation.strapdown import Path, integrate
@@ -46,7 +46,7 @@ def plane_settings(settings: Mapping[str, Any]) -> PlaneSettings:
     )
 
 
-def run_odometry(scans: Scans, imu: Imu, settings: Mapping[str, Any]) -> list[Step]:
+def run_odometry(scans: Sweeps, imu: Imu, settings: Mapping[str, Any]) -> list[Step]:
     """Poses, velocities and biases at the end of every sweep that the IMU covers.
 
     Raises
@@ -85,7 +85,7 @@ def rehearsed(opening: Sequence[Scan], start: State, imu: Imu, settings: Mapping
     return odometry.smoothed_start()
 
 
-def covered_sweeps(scans: Scans, imu: Imu) -> NDArray[np.intp]:
+def covered_sweeps(scans: Sweeps, imu: Imu) -> NDArray[np.intp]:
     """Ordinals of the sweeps within the time of the IMU.
 
     Raises

@@ -20,7 +20,7 @@ from card.estimation.imu_checks import (
 from card.estimation.lidar_only import scan_trajectory
 from card.estimation.odometry import covered_sweeps
 from card.estimation.plane_map import PlaneSettings
-from card.estimation.scans import Scans
+from card.estimation.scans import Sweeps
 
 #: Angle between mean specific force and the rig's z above which no car stands or drives, deg.
 MAX_TILT_DEG = 45.0
@@ -62,7 +62,7 @@ def check_imu(imu: Imu, max_gap_s: float, where: Path) -> None:
 
 
 def check_against_scans(
-    scans: Scans, imu: Imu, settings: Any, planes: PlaneSettings, where: Path
+    scans: Sweeps, imu: Imu, settings: Any, planes: PlaneSettings, where: Path
 ) -> tuple[list[Figure], list[str]]:
     """Figures of agreement between the IMU and scans alone where the car turns most, and notes.
 
@@ -121,7 +121,7 @@ def _median_deg(rotations: NDArray[np.float64]) -> float:
     return float(np.degrees(np.median(np.linalg.norm(rotations, axis=1))))
 
 
-def _liveliest(scans: Scans, imu: Imu, seconds: float) -> list[int]:
+def _liveliest(scans: Sweeps, imu: Imu, seconds: float) -> list[int]:
     """Sweeps of one LiDAR, `seconds` long, during which the gyro varies most."""
     covered = covered_sweeps(scans, imu)
     mine = covered[scans.lidar[covered] == scans.lidar[covered[0]]]

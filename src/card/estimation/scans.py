@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,6 +59,21 @@ class Scan:
         pose = path.pose
         offsets = (self.time_ns - self.start_ns).astype(np.float64)
         return np.asarray(compensate(self.points, offsets, knots, inverse(pose[-1]) @ pose))
+
+
+class Sweeps(Protocol):
+    """Sweeps in order of their ends, wherever they are kept; lidar (S,), start_ns and end_ns (S,)."""
+
+    lidar: NDArray[Any]
+    start_ns: NDArray[np.int64]
+    end_ns: NDArray[np.int64]
+
+    def __len__(self) -> int: ...
+
+    def __getitem__(self, i: int) -> Scan: ...
+
+    def ahead(self, chosen: Iterable[int]) -> Iterator[tuple[int, Scan]]:
+        """Sweeps in the given order."""
 
 
 class Scans:

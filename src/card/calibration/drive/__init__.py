@@ -1,0 +1,1 @@
+"""Rear LiDAR and IMU from the short drive of a calibration session."""
