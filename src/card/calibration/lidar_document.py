@@ -57,6 +57,7 @@ def lidar_document(found: FrontLidar, settings: Mapping[str, Any]) -> dict[str, 
         "left_from_right": covariance[STEREO, STEREO],
         "lidar_front_from_camera_left": covariance[LIDAR, LIDAR],
         "lidar_front_from_camera_right": right_covariance(state, covariance),
+        "together": covariance[: LIDAR.stop, : LIDAR.stop],
     }
     return {
         "schema": "front_lidar_calibration",
