@@ -59,7 +59,7 @@ def trajectory() -> Trajectory:
 
 def scan(path: Trajectory, rig_from_lidar: Array, t_ns: int, sign: int, rng: np.random.Generator) -> Burst:
     """Ground returns 3 to 14 m before (sign 1) or behind (-1) the sensor, skewed by the car's motion."""
-    offset = np.sort(rng.integers(0, BURST_NS - 1_000_000, 6000)).astype(np.uint32)
+    offset = np.sort(rng.integers(0, BURST_NS - 1_000_000, 4000)).astype(np.uint32)
     world_from_lidar = path.at(t_ns + offset.astype(np.int64)) @ rig_from_lidar
     x = rng.uniform(-2.5, 2.5, offset.size)
     y = world_from_lidar[:, 1, 3] + sign * rng.uniform(3, 14, offset.size)
@@ -262,8 +262,8 @@ def test_without_points_and_images_there_are_gaps_and_no_planes(drive: Path, tmp
 
 
 def test_a_standing_car_reads_few_bursts(result: Any) -> None:
-    """34 m driven in 10 s: each LiDAR is read once a metre, and not while the car stands."""
-    assert 2 * 20 < result[2]["counts"]["bursts"] <= 2 * 35
+    counts = result[2]["counts"]
+    assert 2 * 99 - 2 * 16 < counts["bursts"] < 2 * 99 - 2 * 10
 
 
 @pytest.mark.parametrize("when_s", [0.5, 5.0, 9.0])

@@ -63,7 +63,7 @@ def test_a_burst_that_is_cropped_keeps_its_own_end(tmp_path: Path, deskewed: boo
         corridor,
         12.0,
     )
-    burst = BurstFile("lidar_front", t_ns, tmp_path / f"{t_ns}.laz")
+    burst = BurstFile("lidar_front", t_ns, 1, tmp_path / f"{t_ns}.laz")
     (found,) = collect_samples([burst], cutter, threads=1)
     wanted, _ = corridor_points(world, contact, (0.0, 30.0), corridor)
     assert len(wanted) == 200
@@ -95,7 +95,7 @@ def test_cut_points_are_those_of_the_plain_way(tmp_path: Path) -> None:
     paths = [contact_path(path, contact, 0.05) for contact in ([0.8, 1.0, -1.7], [-0.8, -1.5, -1.7])]
     lidar = Lidar(rig_from_lidar, corrections, False)
     cutter = Cutter({"lidar_front": lidar}, path, paths, static, 1, corridor, reach_m)
-    found = cutter.cut([BurstFile("lidar_front", t_ns, tmp_path / f"{t_ns}.laz")])
+    found = cutter.cut([BurstFile("lidar_front", t_ns, 1, tmp_path / f"{t_ns}.laz")])
 
     points = deskew_plain(read_burst(tmp_path / f"{t_ns}.laz"), rig_from_lidar, path, corrections)
     points = points[static.near(points, 1)]
@@ -116,7 +116,9 @@ def test_cells_near_a_place_are_its_own_and_those_beside() -> None:
     assert 0.1 < wanted.mean() < 0.9
 
 
-def test_bursts_are_a_step_apart_and_none_is_read_while_the_car_stands() -> None:
+@pytest.mark.parametrize(("points", "step_m"), [(40_000, 1.0), (20, 0.05)])
+def test_bursts_are_as_far_apart_as_their_points_reach(points: int, step_m: float) -> None:
+    """And none is read while the car stands."""
     t = np.arange(0, 8, 0.01)
     y = np.interp(t, [0, 2, 4, 6, 8], [0, 10, 10, 4, 4])  # 5 m/s, stands, back at 3 m/s, stands
     position = np.stack([np.zeros_like(t), y, np.full_like(t, 1.7)], axis=1)
@@ -124,12 +126,16 @@ def test_bursts_are_a_step_apart_and_none_is_read_while_the_car_stands() -> None
     path = contact_path(
         Trajectory(START_NS + np.round(t * 1e9).astype(np.int64), position, still), [0.8, 1.0, -1.7], 0.05
     )
-    starts = START_NS + np.arange(0, 78) * 100_000_000
-    bursts = [BurstFile(lidar, int(s), Path("b")) for s in starts for lidar in ("lidar_front", "lidar_rear")]
-    kept = spaced_bursts(bursts, path, 1.0)
+    bursts = [
+        BurstFile(lidar, START_NS + number * 100_000_000, points, Path("b"))
+        for number in range(78)
+        for lidar in ("lidar_front", "lidar_rear")
+    ]
+    kept = spaced_bursts(bursts, path, 40_000, 0.05)
     for lidar in ("lidar_front", "lidar_rear"):
         arc = path.arc_at([burst.t_start_ns for burst in kept if burst.lidar == lidar])
         assert arc[0] == 0
-        assert np.diff(arc).min() >= 1.0
-        assert np.diff(arc).max() < 1.0 + 0.5 + 1e-6
-        assert len(arc) == 11 + 5  # every 1.0 m to 10 m, every 1.2 m back
+        assert np.diff(arc).min() >= step_m - 1e-9
+        assert np.diff(arc).max() < step_m + 0.5 + 1e-9
+        # Every metre to 10 m and every 1.2 m back; or every sweep in motion.
+        assert len(arc) == (11 + 5 if step_m == 1.0 else 21 + 20)

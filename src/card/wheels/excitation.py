@@ -68,7 +68,8 @@ def excite(
         for name in WHEELS
     }
     description = read_description(recording)
-    files = spaced_bursts(_burst_files(bursts, recording), paths["fl"], settings["burst_step_m"])
+    spacing = settings["points_per_m"], settings["min_step_m"]
+    files = spaced_bursts(_burst_files(bursts, recording), paths["fl"], *spacing)
     cutter = Cutter(
         _lidars(bundle, description),
         path,
@@ -122,8 +123,11 @@ def excite(
 
 def _burst_files(bursts: Path, recording: Path) -> list[BurstFile]:
     table = read_table(bursts, "bursts")
-    columns = (table[name].to_pylist() for name in ("lidar", "t_start_ns", "file"))
-    files = [BurstFile(lidar, t_ns, recording / file) for lidar, t_ns, file in zip(*columns, strict=True)]
+    columns = (table[name].to_pylist() for name in ("lidar", "t_start_ns", "points", "file"))
+    files = [
+        BurstFile(lidar, t_ns, points, recording / file)
+        for lidar, t_ns, points, file in zip(*columns, strict=True)
+    ]
     return sorted(files, key=lambda file: (file.t_start_ns, file.lidar))
 
 

@@ -35,24 +35,27 @@ class Lidar:
 
 @dataclass(frozen=True)
 class BurstFile:
-    """A burst to read: its LiDAR, start in ns and file."""
+    """A burst to read: its LiDAR, start in ns, number of points and file."""
 
     lidar: str
     t_start_ns: int
+    points: int
     file: Path
 
 
-def spaced_bursts(bursts: Sequence[BurstFile], path: ContactPath, burst_step_m: float) -> list[BurstFile]:
-    """The bursts before which the wheel moved a step since the last one kept of the same LiDAR.
+def spaced_bursts(
+    bursts: Sequence[BurstFile], path: ContactPath, points_per_m: float, min_step_m: float
+) -> list[BurstFile]:
+    """So many bursts of each LiDAR that the way to the next one is about their points by `points_per_m`.
 
-    A standing car sees the same points over and over.
+    It is at least a step: a standing car sees the same points over and over.
     """
-    last: dict[str, float] = {}
+    following: dict[str, float] = {}
     kept = []
     arcs = path.arc_at([burst.t_start_ns for burst in bursts]).tolist()
     for burst, arc in zip(bursts, arcs, strict=True):
-        if burst.lidar not in last or arc - last[burst.lidar] >= burst_step_m:
-            last[burst.lidar] = arc
+        if arc >= following.get(burst.lidar, arc):
+            following[burst.lidar] = arc + max(burst.points / points_per_m, min_step_m)
             kept.append(burst)
     return kept
 
