@@ -17,8 +17,8 @@ def kiss_icp(scans, imu):
     from kiss_icp.kiss_icp import KissICP
 
     config = KISSConfig()
-    config.data.max_range, config.data.min_range = 80.0, 2.5
-    config.mapping.voxel_size = 0.8
+    # Their own default where no voxel size is given.
+    config.mapping.voxel_size = config.data.max_range / 100
     system = KissICP(config)
     for points, time_ns in scans:
         since = (time_ns - time_ns[0]).astype(np.float64)
@@ -32,7 +32,7 @@ def rko_lio(scans, imu):
 
     system, fed = LIO(LIOConfig()), 0
     for points, time_ns in scans:
-        while fed < len(imu["t_ns"]) and imu["t_ns"][fed] <= time_ns.max() + 5_000_000:
+        while fed < len(imu["t_ns"]) and imu["t_ns"][fed] <= time_ns.max():
             system.add_imu_measurement(imu["accel"][fed], imu["gyro"][fed], int(imu["t_ns"][fed]))
             fed += 1
         system.register_scan(points, time_ns)
