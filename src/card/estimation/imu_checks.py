@@ -24,6 +24,8 @@ LARGEST_OFFSET_S, OFFSET_STEP_S = 0.3, 0.01
 TILTED = 2.0
 #: Rotation of a window, rms in rad, below which the gyro says nothing about clocks and axes.
 LEAST_ROTATION = 0.005
+#: Share of the squared rotations that a gyro with right axes and unit may leave unexplained.
+UNEXPLAINED = 0.25
 
 
 @dataclass(frozen=True)
@@ -114,20 +116,30 @@ def integrated_gyro(imu: Imu, edges_ns: NDArray[np.int64], shift_s: float = 0.0)
 
 
 def clock_offset(imu: Imu, windows: Windows) -> tuple[float, float]:
-    """Seconds to add to the trajectory's times to have the IMU's, from the sizes of rotations, and its sigma.
+    """Seconds to add to the trajectory's times to have the IMU's, and its sigma.
 
-    Sizes, so that swapped axes do not hide an offset. The sigma is that of a least-squares fit: the misfit
-    that is left, over the misfit's curvature.
+    The rotations are compared less their mean, in which the gyro's bias is; where swapped axes or another
+    unit leave them unexplained, only their sizes. Beside a steady turn, sizes hardly tell of another axis.
+    The sigma is that of a least-squares fit: the misfit that is left, over the misfit's curvature.
     """
     wanted = np.linalg.norm(windows.rotated, axis=1)
+    turned = windows.rotated - windows.rotated.mean(axis=0)
 
-    def misfit(shift: float) -> float:
+    def of_sizes(shift: float) -> float:
         found = np.linalg.norm(integrated_gyro(imu, windows.edges_ns, shift), axis=1)
         scale = (found @ wanted) / max(found @ found, 1e-12)
         return float(np.sum((scale * found - wanted) ** 2))
 
+    def of_axes(shift: float) -> float:
+        found = integrated_gyro(imu, windows.edges_ns, shift)
+        return float(np.sum((found - found.mean(axis=0) - turned) ** 2))
+
     shifts = np.arange(-LARGEST_OFFSET_S, LARGEST_OFFSET_S + 1e-9, OFFSET_STEP_S)
-    best = float(shifts[int(np.argmin([misfit(shift) for shift in shifts]))])
+    fits = [(misfit, [misfit(shift) for shift in shifts]) for misfit in (of_sizes, of_axes)]
+    # Axes that are swapped, or a rate in degrees, leave most of what turned unexplained.
+    right = min(fits[1][1]) < UNEXPLAINED * float(np.sum(turned**2))
+    misfit, values = fits[1] if right else fits[0]
+    best = float(shifts[int(np.argmin(values))])
     bounds = (best - OFFSET_STEP_S, best + OFFSET_STEP_S)
     found = float(minimize_scalar(misfit, bounds=bounds, method="bounded", options={"xatol": 1e-5}).x)
     left, h = misfit(found), OFFSET_STEP_S
