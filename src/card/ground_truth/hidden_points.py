@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from card.ground_truth.hpr.cells import reach
 from card.ground_truth.hpr.visible import visible_points
 from card.ground_truth.hpr.workspace import Workspace
 from card.ground_truth.selection import diagonal
@@ -37,7 +38,7 @@ def two_pass_visibility(
     Indices into `static` after pass 1, into `static` after pass 2, into `keyframe` after pass 2.
     """
     D = diameter
-    if max(_reach(static), _reach(keyframe)) >= settings["hpr_first"] * D:
+    if max(reach(static), reach(keyframe)) >= settings["hpr_first"] * D:
         # At a sequence's end hardly anything may be static; then the keyframe and the viewer count too.
         D = diagonal(np.concatenate([static, keyframe, np.zeros((1, 3))]))
     passes = settings["hidden_point_removal"]
@@ -49,10 +50,5 @@ def two_pass_visibility(
     if passes == "off":
         return first, again, np.arange(len(keyframe))
     radius = settings["hpr_second" if passes == "two_pass" else "hpr_first"] * D
-    second = visible_points(both, radius, workspace)
+    second = visible_points(both, radius, workspace, mostly_visible=passes == "two_pass")
     return first, again[second[second < len(again)]], second[second >= len(again)] - len(again)
-
-
-def _reach(points: Points) -> float:
-    """Range, metres, of the point (N, 3) farthest from the viewer."""
-    return float(np.sqrt(np.einsum("ij,ij->i", points, points).max(initial=0.0)))

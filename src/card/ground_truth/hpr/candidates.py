@@ -55,12 +55,10 @@ def near_enough(cell: Any, range2: Any, limit: Any, kept: Any) -> int:
 
 
 @compiled
-def low_enough(
-    lifted: Any, index: Any, bound: Any, cells: Cells, kept: Any, kept_index: Any, place: Any
-) -> int:
+def low_enough(lifted: Any, index: Any, bound: Any, cells: Cells, kept: Any, place: Any) -> int:
     """Keep the lifted points (M, 4) that are not above the bilinear bound; return how many.
 
-    kept, kept_index, place : (M, 4), (M,), (M, 2) the points, their indices, column and row of their cells.
+    kept, place : (M,), (M, 2) output: their indices, column and row of their cells.
     """
     per_cell = 1.0 / cells.size
     count = 0
@@ -71,9 +69,7 @@ def low_enough(
         y -= row
         low = bound[row, column] + x * (bound[row, column + 1] - bound[row, column])
         high = bound[row + 1, column] + x * (bound[row + 1, column + 1] - bound[row + 1, column])
-        for k in range(4):
-            kept[count, k] = lifted[i, k]
-        kept_index[count] = index[i]
+        kept[count] = index[i]
         place[count, 0], place[count, 1] = column, row
         count += lifted[i, 2] <= (low + y * (high - low)) * (1 + _HEIGHT_ROOM)
     return count

@@ -95,6 +95,26 @@ def assign(points: Any, cells: Cells, cell: Any, range2: Any, nearest: Any) -> N
                 nearest[cell[i]] = rank
 
 
+@compiled
+def place_all(points: Any, cells: Cells, place: Any) -> None:
+    """Write column and row (N, 2) uint16 of the cell of each point."""
+    per_cell = 1.0 / cells.size
+    for i in range(points.shape[0]):
+        inverse = 1.0 / points[i, 2]
+        place[i, 0] = np.int32((points[i, 0] * inverse - cells.u0) * per_cell)
+        place[i, 1] = np.int32((points[i, 1] * inverse - cells.v0) * per_cell)
+
+
+@compiled
+def reach(points: Any) -> float:
+    """Range, metres, of the point (N, 3) farthest from the viewer."""
+    farthest = 0.0
+    for i in range(points.shape[0]):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        farthest = max(farthest, x * x + y * y + z * z)
+    return np.sqrt(farthest)
+
+
 def indices(nearest: npt.NDArray[np.uint64]) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
     """Cells that hold a point (M,), and the nearest point (M,) of each."""
     occupied = np.flatnonzero(nearest != EMPTY)

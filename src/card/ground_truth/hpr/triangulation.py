@@ -18,12 +18,13 @@ import numpy as np
 import numpy.typing as npt
 
 from card.ground_truth.compiled import compiled
+from card.ground_truth.hpr.cells import Cells
 from card.ground_truth.hpr.workspace import Workspace
 
 Indices = npt.NDArray[np.uint32]
 
 #: Corners that stand for infinity, placed after the points: their distance in (u, v) in units of the largest
-#: coordinate, and their height in units of that distance.
+#: coordinate of a cell, and their height in units of that distance.
 CORNERS = 4
 _FAR, _HIGH = 8.0, 1e8
 #: No side there; no triangle there; seen by no point.
@@ -58,9 +59,10 @@ class Mesh(NamedTuple):
         return cls(*(workspace.take(n, s, np.uint32) for n, s in zip(cls._fields, shapes, strict=True)))
 
 
-def add_corners(lifted: Any) -> None:
-    """Fill the last four rows of `lifted` (M + 4, 4)."""
-    far = _FAR * max(1.0, float(np.abs(lifted[:-CORNERS, :2]).max()))
+def add_corners(lifted: Any, cells: Cells) -> None:
+    """Fill the last four rows of `lifted` (M + 4, 4), whose points lie in the cells."""
+    u, v = cells.u0 + cells.columns * cells.size, cells.v0 + cells.rows * cells.size
+    far = _FAR * max(1.0, abs(cells.u0), abs(u), abs(cells.v0), abs(v))
     lifted[-CORNERS:] = [
         (su * far, sv * far, _HIGH * far, 1.0) for su, sv in ((-1, -1), (1, -1), (1, 1), (-1, 1))
     ]

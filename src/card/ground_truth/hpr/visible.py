@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from card.errors import CardError
 from card.ground_truth.hpr.candidates import farthest, low_enough, near_enough
-from card.ground_truth.hpr.cells import EMPTY, Cells, assign, indices, lay_out, survey
+from card.ground_truth.hpr.cells import EMPTY, Cells, assign, indices, lay_out, place_all, survey
 from card.ground_truth.hpr.insertion_order import by_rounds, morton_order
 from card.ground_truth.hpr.lift import COLUMNS, lift
 from card.ground_truth.hpr.triangulation import CORNERS, MAX_STEPS, Mesh, add_corners, lower_hull
@@ -21,12 +21,17 @@ Points = npt.NDArray[np.float64]
 
 
 def visible_points(
-    points: npt.NDArray[np.float64], radius: float, workspace: Workspace | None = None
+    points: npt.NDArray[np.float64],
+    radius: float,
+    workspace: Workspace | None = None,
+    *,
+    mostly_visible: bool = False,
 ) -> npt.NDArray[np.int64]:
     """Increasing indices of the points (N, 3), metres, that a viewer at the origin sees, looking along +z.
 
     The same set as `visible_by_hull` gives, once points closer together than 1e-8 m are merged: of those one
-    is returned. `radius` is that of the sphere of the flip, metres.
+    is returned. `radius` is that of the sphere of the flip, metres. Where points are `mostly_visible` it does
+    not pay to look for hidden ones first.
 
     Raises
     ------
@@ -41,23 +46,37 @@ def visible_points(
         return np.arange(len(points))
     memory = workspace or Workspace()
     cells = lay_out(u_low, u_high, v_low, v_high, len(points))
-    lifted, index, place = _candidates(points, 2 * radius, cells, memory)
+    candidates = _all if mostly_visible else _candidates
+    index, place = candidates(points, 2 * radius, cells, memory)
     morton, order, spare, sequence = memory.take("order", (4, len(index)), np.uint32)
     morton_order(place, morton, order, spare)
+    in_order = memory.take("in order", len(index), np.uint32)
+    np.take(index, order, out=in_order)
     ordered = memory.take("ordered", (len(index) + CORNERS, COLUMNS), np.float64)
-    np.take(lifted, order, axis=0, out=ordered[:-CORNERS])
-    add_corners(ordered)
+    lift(points, in_order, 2 * radius, ordered)
+    add_corners(ordered, cells)
     by_rounds(ordered, morton, order, sequence, memory.take("used", len(index), np.bool_))
     vertex = np.zeros(len(ordered), np.bool_)
     if not lower_hull(ordered, sequence, Mesh.of(len(index), memory), vertex, MAX_STEPS):
         return visible_by_hull(points, radius)
-    return np.sort(index[order[vertex[:-CORNERS]]]).astype(np.int64)
+    seen = np.zeros(len(points), np.bool_)
+    seen[in_order[vertex[:-CORNERS]]] = True
+    return np.flatnonzero(seen)
+
+
+def _all(
+    points: Points, diameter: float, cells: Cells, memory: Workspace
+) -> tuple[npt.NDArray[np.uint32], npt.NDArray[np.uint16]]:
+    """Every point as `_candidates` gives them."""
+    place = memory.take("place", (len(points), 2), np.uint16)
+    place_all(points, cells, place)
+    return np.arange(len(points), dtype=np.uint32), place
 
 
 def _candidates(
     points: Points, diameter: float, cells: Cells, memory: Workspace
-) -> tuple[Points, npt.NDArray[np.uint32], npt.NDArray[np.uint16]]:
-    """What may be visible: lifted (M, 4), indices (M,), and column and row of their cells (M, 2)."""
+) -> tuple[npt.NDArray[np.uint32], npt.NDArray[np.uint16]]:
+    """What may be visible: indices (M,), and column and row of their cells (M, 2)."""
     nearest = memory.take("nearest", cells.rows * cells.columns, np.uint64)
     nearest[:] = EMPTY
     cell = memory.take("cell", len(points), np.uint32)
@@ -73,11 +92,10 @@ def _candidates(
     index = index[: near_enough(cell, range2, limit, index)]
     lifted = memory.take("lifted", (len(index), COLUMNS), np.float64)
     lift(points, index, diameter, lifted)
-    kept = memory.take("kept", (len(index), COLUMNS), np.float64)
     kept_index = memory.take("kept index", len(index), np.uint32)
     place = memory.take("place", (len(index), 2), np.uint16)
-    count = low_enough(lifted, index, bound, cells, kept, kept_index, place)
-    return kept[:count], kept_index[:count], place[:count]
+    count = low_enough(lifted, index, bound, cells, kept_index, place)
+    return kept_index[:count], place[:count]
 
 
 def _refuse(point: Points, radius: float) -> NoReturn:
