@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from card.ground_truth.compiled import compiled
-from card.ground_truth.hpr.cells import Cells
+from card.ground_truth.hpr.cells import PARTS, Cells
 from card.ground_truth.hpr.upper_bound import UNKNOWN
 
 #: Relative room for rounding, of heights in float64 and of squared ranges in float32.
@@ -58,7 +58,7 @@ def near_enough(cell: Any, range2: Any, limit: Any, kept: Any) -> int:
 def low_enough(lifted: Any, index: Any, bound: Any, cells: Cells, kept: Any, place: Any) -> int:
     """Keep the lifted points (M, 4) that are not above the bilinear bound; return how many.
 
-    kept, place : (M,), (M, 2) output: their indices, column and row of their cells.
+    kept, place : (M,), (M, 2) output: their indices, and places as `cells.place_all` writes them.
     """
     per_cell = 1.0 / cells.size
     count = 0
@@ -67,9 +67,10 @@ def low_enough(lifted: Any, index: Any, bound: Any, cells: Cells, kept: Any, pla
         column, row = int(x), int(y)
         x -= column
         y -= row
+        fine_x, fine_y = int(x * PARTS), int(y * PARTS)
         low = bound[row, column] + x * (bound[row, column + 1] - bound[row, column])
         high = bound[row + 1, column] + x * (bound[row + 1, column + 1] - bound[row + 1, column])
         kept[count] = index[i]
-        place[count, 0], place[count, 1] = column, row
+        place[count, 0], place[count, 1] = column * PARTS + fine_x, row * PARTS + fine_y
         count += lifted[i, 2] <= (low + y * (high - low)) * (1 + _HEIGHT_ROOM)
     return count

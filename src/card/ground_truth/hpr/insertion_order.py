@@ -14,14 +14,14 @@ import numpy as np
 from card.ground_truth.compiled import compiled
 
 #: Bits of a Morton number that each of the two sorting passes looks at.
-_DIGIT = 11
+_DIGIT = 13
 #: Blocks of 16 x 16 cells, 4 x 4 cells, then single ones, as bits of the Morton number.
-_BLOCKS = (8, 4, 0)
+_BLOCKS = (12, 8, 4)
 
 
 @compiled
 def _spread(bits: int) -> int:
-    """Eleven bits, each followed by a zero."""
+    """Thirteen bits, each followed by a zero."""
     bits = (bits | (bits << 8)) & 0x00FF00FF
     bits = (bits | (bits << 4)) & 0x0F0F0F0F
     bits = (bits | (bits << 2)) & 0x33333333
@@ -30,9 +30,9 @@ def _spread(bits: int) -> int:
 
 @compiled
 def morton_order(place: Any, morton: Any, order: Any, spare: Any) -> None:
-    """Sort points by the Morton number of their cells; the order given holds within a cell.
+    """Sort points by the Morton number of their places; the order given holds within a place.
 
-    place : (M, 2) column and row. morton, order, spare : (M,) uint32; the numbers and the permutation.
+    place : (M, 2) along u and v. morton, order, spare : (M,) uint32; the numbers and the permutation.
     """
     mask = (1 << _DIGIT) - 1
     starts = np.zeros((2, (1 << _DIGIT) + 1), np.int64)

@@ -76,7 +76,7 @@ def _all(
 def _candidates(
     points: Points, diameter: float, cells: Cells, memory: Workspace
 ) -> tuple[npt.NDArray[np.uint32], npt.NDArray[np.uint16]]:
-    """What may be visible: indices (M,), and column and row of their cells (M, 2)."""
+    """What may be visible: indices (M,), and places (M, 2) as `place_all` writes them."""
     nearest = memory.take("nearest", cells.rows * cells.columns, np.uint64)
     nearest[:] = EMPTY
     cell = memory.take("cell", len(points), np.uint32)
