@@ -9,13 +9,15 @@ import numpy as np
 
 from card.artifacts import default_settings, write_json
 from card.calibration.board import Board
-from card.calibration.board_views import BoardViews, read_board_views
+from card.calibration.board_views import BoardViews
 from card.geometry import inverse
+from card.simulation import board
 from card.simulation.board_images import write_board_yaml
 from card.simulation.board_observations import Observations, board_places, observe, write_observations
 from card.simulation.drawing import drawing
 from card.simulation.rig import Rig, built_rig
 
+BOARD = Board(*board.INNER_CORNERS, board.SQUARE_M, np.array(board.SIZE_M), np.array(board.PLATE_CORNER_M))
 DAY = "2026-04-14"
 WIDTH, HEIGHT = 2248, 2252
 #: Twice what the detector errs by on simulated images of full size.
@@ -41,9 +43,6 @@ class Session:
     @property
     def drawing(self) -> Path:
         return self.folder / "drawing.json"
-
-    def views(self) -> BoardViews:
-        return read_board_views(self.boards, Board.read(self.board))
 
 
 def settings(**front_lidar: Any) -> dict[str, Any]:
@@ -75,6 +74,13 @@ def save(folder: Path, observed: Observations, rig: Rig) -> Session:
     write_observations(observed, rig, session=folder, boards=session.boards)
     write_json(session.drawing, drawing("full"), "drawing")
     return session
+
+
+def views_of(observed: Observations, rig: Rig) -> BoardViews:
+    """The views as the detector would give them."""
+    camera = rig.cameras["camera_left"]
+    names = tuple(str(t_ns) for t_ns in observed.t_ns)
+    return BoardViews(names, observed.t_ns, observed.pixels, (camera.width, camera.height))
 
 
 def left_from_right(rig: Rig) -> np.ndarray:

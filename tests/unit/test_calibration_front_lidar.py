@@ -1,25 +1,47 @@
 """Cameras and front LiDAR in one estimate: against truth and differences; wrong returns refused by name."""
 
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from board_sessions import Session, lidar_from, observations, rig_of, save, settings
+from board_sessions import (
+    BOARD,
+    Session,
+    lidar_from,
+    observations,
+    places,
+    rig_of,
+    save,
+    settings,
+    views_of,
+)
 
 from card.artifacts import read_json
 from card.calibration.cameras import calibrate_cameras
 from card.calibration.front_lidar import calibrate_front_lidar
+from card.calibration.lidar_estimate import FrontLidar, estimate_front_lidar
+from card.calibration.lidar_start import Drawn
+from card.calibration.plane_alignment import align_planes
 from card.calibration.return_residuals import BoardReturns
-from card.calibration.state import State, step_between
-from card.geometry import from_json
+from card.calibration.session_sweeps import sweeps_of
+from card.calibration.state import State, intrinsics_of, moved, step_between
+from card.errors import CardError
+from card.geometry import from_json, inverse, transform
+from card.recording.burst import Burst
+from card.simulation.board_scene import board_quads
+from card.simulation.board_sweep import sweep
+from card.simulation.drawing import drawing
+from card.simulation.quads import Quad
 from card.simulation.rig import CAMERAS
 
-COUNT = 40
+COUNT = 30
 
 
-def run(session: Session, out: Path) -> tuple[dict[str, Any], dict[str, Any]]:
-    stated = {"board": session.board, "boards": session.boards, "settings": settings(), "gates": []}
+def run(session: Session, out: Path, **changed: Any) -> tuple[dict[str, Any], dict[str, Any]]:
+    stated = {"board": session.board, "boards": session.boards, "settings": settings(**changed), "gates": []}
     calibrate_cameras(cameras=out / "cameras.json", report=out / "cameras.report.json", **stated)
     calibrate_front_lidar(
         session=session.folder,
@@ -109,3 +131,148 @@ def test_derivatives_of_the_returns_are_those_of_differences() -> None:
         step[:, axis] = 1e-6
         ahead, back = (block.residual(state.moved(np.zeros(127), sign * step)) for sign in (1, -1))
         np.testing.assert_allclose(linear.pose[there, axis], (ahead - back)[there] / 2e-6, atol=1e-7)
+
+
+def truth_of(session: Session) -> State:
+    """The true cameras and board poses; what is wrong in the tests below are returns."""
+    rig = session.rig
+    left_from_board = inverse(rig.rig_from["camera_left"]) @ places(1, COUNT)
+    intrinsics = np.array([intrinsics_of(rig.cameras[name]) for name in CAMERAS])
+    stereo = inverse(rig.rig_from["camera_left"]) @ rig.rig_from["camera_right"]
+    return State(intrinsics, stereo, np.eye(4), np.zeros(97), left_from_board)
+
+
+def estimate(
+    session: Session, bursts: Sequence[Burst | None], drawn: Drawn | None = None, **changed: Any
+) -> FrontLidar:
+    stated = settings(**{"starts": 2, "max_returns": 100, **changed})["front_lidar"] | {
+        "corner_sigma_px": 0.05
+    }
+    views = views_of(session.observed, session.rig)
+    drawn = drawn or Drawn.of(drawing("full"))
+    return estimate_front_lidar(views, bursts, truth_of(session), BOARD, drawn, stated, "session")
+
+
+def error_of(found: FrontLidar, session: Session) -> tuple[float, float]:
+    step = step_between(found.solution.state.lidar_from_left, lidar_from(session.rig, "camera_left"))
+    return float(np.degrees(np.linalg.norm(step[3:]))), 1e3 * float(np.linalg.norm(step[:3]))
+
+
+def seen_with(
+    session: Session, views: Iterable[int], size_m: tuple[float, float], behind_m: float, *, board: bool
+) -> list[Burst]:
+    """The session's sweeps, in some views with a surface parallel to the board and behind its middle."""
+    bursts, rng = list(session.observed.bursts), np.random.default_rng(9)
+    for view in views:
+        pose = places(1, COUNT)[view]
+        corner = pose @ transform([*(BOARD.centre_m[:2] - np.divide(size_m, 2)), behind_m])
+        surface = Quad(corner, size_m, np.full((4, 4, 3), 150, np.uint8), 150)
+        quads = [surface, *board_quads(pose)] if board else [surface]
+        bursts[view] = sweep(session.rig, quads, 400, view, bursts[view].t_ns, rng)
+    return bursts
+
+
+def test_a_wall_close_behind_every_board_does_not_matter(session: Session) -> None:
+    bursts = seen_with(session, range(COUNT), (3.0, 3.0), 0.1, board=True)
+    found = estimate(session, bursts)
+    assert sum(bool(reason) for reason in found.reasons) <= 2
+    degrees, millimetres = error_of(found, session)
+    assert degrees < 0.06
+    assert millimetres < 5
+
+
+def test_views_in_which_the_lidar_saw_the_wall_instead_are_refused_by_name(session: Session) -> None:
+    walls = [3, 11, 12, 29]
+    found = estimate(session, seen_with(session, walls, (3.0, 3.0), 0.1, board=False))
+    for view in walls:
+        assert "a plane that goes on beyond the board" in found.reasons[view]
+    degrees, millimetres = error_of(found, session)
+    assert degrees < 0.06
+    assert millimetres < 5
+
+
+def test_a_surface_of_the_size_of_the_board_behind_it_is_found_out(session: Session) -> None:
+    decoys = [2, 9, 16, 23]
+    found = estimate(session, seen_with(session, decoys, (1.13, 0.8), 0.09, board=False))
+    for view in decoys:
+        assert "returns within 0.03 m of the board: those found lie elsewhere" in found.reasons[view]
+    degrees, millimetres = error_of(found, session)
+    assert degrees < 0.06
+    assert millimetres < 5
+
+
+def test_a_session_of_walls_is_refused_and_a_view_named(session: Session) -> None:
+    bursts = seen_with(session, range(COUNT), (3.0, 3.0), 0.1, board=False)
+    message = r"too few views with returns .*0 of 30; view 2000000000: returns are of a plane that goes on"
+    with pytest.raises(CardError, match=message):
+        estimate(session, bursts)
+
+
+def test_a_drawing_that_is_degrees_off_will_do(session: Session) -> None:
+    rng = np.random.default_rng(4)
+    sigmas = [0.03] * 3 + [np.radians(1.5)] * 3
+    drawn = Drawn(moved(lidar_from(session.rig, "camera_left"), rng.normal(0, sigmas)), 0.03, np.radians(1.5))
+    found = estimate(session, session.observed.bursts, drawn, starts=4)
+    assert sum(not reason for reason in found.reasons) > 0.8 * COUNT
+    assert found.starts_agreed == found.starts
+    degrees, millimetres = error_of(found, session)
+    assert degrees < 0.06
+    assert millimetres < 5
+
+
+def test_views_without_a_sweep_are_left_out(session: Session, tmp_path: Path) -> None:
+    bursts: list[Burst | None] = list(session.observed.bursts)
+    bursts[5] = None
+    assert estimate(session, bursts).reasons[5] == "no sweep of the LiDAR at its time"
+    (tmp_path / "lidar_front").mkdir()
+    with pytest.raises(CardError, match="session has no sweeps of the board"):
+        list(sweeps_of(tmp_path / "lidar_front", [1]))
+    times = session.observed.t_ns.tolist()
+    found = list(sweeps_of(session.folder, [times[0], times[0] + 10**9, times[1]]))
+    assert [None if burst is None else burst.t_ns for burst in found] == [
+        session.observed.bursts[0].t_ns,
+        None,
+        session.observed.bursts[1].t_ns,
+    ]
+
+
+def test_the_closed_form_is_exact_without_noise_and_leaves_wrong_planes_out() -> None:
+    rng = np.random.default_rng(6)
+    true = transform([0.3, -0.1, 0.2], rng.normal(size=4))
+    normals = rng.normal(size=(20, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    offsets = rng.uniform(1, 5, 20)
+    turned = normals @ true[:3, :3].T
+    moved_offsets = offsets + turned @ true[:3, 3]
+    moved_offsets[[4, 9]] += 0.5
+    found = align_planes(turned, moved_offsets, normals, offsets)
+    np.testing.assert_allclose(found, true, atol=1e-9)
+
+
+def test_same_input_gives_the_same_bytes(session: Session, tmp_path: Path) -> None:
+    for name in ("one", "other"):
+        (tmp_path / name).mkdir()
+        run(session, tmp_path / name, starts=2, max_returns=50)
+    for name in ("cameras.json", "front_lidar.json", "front_lidar.report.json"):
+        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "other" / name).read_bytes()
+
+
+def test_detections_of_another_session_are_refused(session: Session, tmp_path: Path) -> None:
+    run(session, tmp_path, starts=2, max_returns=50)
+    few = replace(
+        session.observed, t_ns=session.observed.t_ns[:20], pixels=session.observed.pixels[:, :20], bursts=[]
+    )
+    other = save(tmp_path / "other", few, session.rig)
+    with pytest.raises(CardError, match=r"detections are not those of the camera calibration.*no view 42000"):
+        calibrate_front_lidar(
+            session=session.folder,
+            boards=other.boards,
+            cameras=tmp_path / "cameras.json",
+            board=session.board,
+            drawing=session.drawing,
+            front_lidar=tmp_path / "new.json",
+            report=tmp_path / "new.report.json",
+            settings=settings(),
+            gates=[],
+        )
+    assert not list(tmp_path.glob("new*"))

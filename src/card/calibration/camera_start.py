@@ -20,6 +20,7 @@ _STOP = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 60, 1e-9)
 
 def start_intrinsics(views: BoardViews, board: Board, most: int) -> Array:
     """Intrinsics (2, 9) of both cameras by OpenCV, of at most so many views."""
+    cv2.setNumThreads(1)  # keeps sums in one order
     chosen = spread(len(views), most)
     corners = [board.corners_m.astype(np.float32)] * len(chosen)
     rows = []
@@ -59,6 +60,7 @@ def agreement(poses: Array, settings: Mapping[str, Any]) -> NDArray[np.bool_]:
 
 def opencv_stereo(views: BoardViews, board: Board, intrinsics: Array, most: int) -> Array:
     """``left_from_right`` (4, 4) by OpenCV with these intrinsics, of at most so many views."""
+    cv2.setNumThreads(1)
     chosen = spread(len(views), most)
     models = [camera_model(row, *views.size) for row in intrinsics]
     left, right = (list(pixels[chosen].astype(np.float32)) for pixels in views.pixels)
