@@ -17,7 +17,8 @@ from card.estimation.imu import Imu, read_imu
 from card.geometry import Trajectory, quaternion_from_matrix, to_json
 from card.recording.burst import Burst
 from card.recording.laz import write_burst
-from card.recording.paths import LIDARS
+from card.recording.paths import CAMERAS, LIDARS
+from card.simulation.drawing import drawing
 from card.simulation.imu import ImuErrors, imu_times, measured_imu
 from card.simulation.lidar import CHANNEL_NS, PERIOD_NS, SPIN_PHASE_NS, directions
 from card.simulation.rig import ImuUnit, lidar_elevations_rad, nominal_rig
@@ -59,7 +60,7 @@ class Yard:
     imu_table: dict[str, Any]
 
     def write(self, folder: Path) -> None:
-        """The drive's folder, drawing.json and front_lidar.json beside it."""
+        """Write the drive to a folder's ``drive``."""
         drive = folder / "drive"
         for name in LIDARS:
             (drive / name).mkdir(parents=True)
@@ -69,7 +70,7 @@ class Yard:
 
 
 def yard(
-    seed: int, *, seconds: float = 6.0, columns: int = 30, knot_s: float = 0.5, lively: bool = True
+    seed: int, *, seconds: float = 6.0, columns: int = 30, knot_s: float = 0.25, lively: bool = True
 ) -> Yard:
     """A round on a yard, over bumps; straight and level if not `lively`."""
     rng = np.random.default_rng(seed)
@@ -171,18 +172,38 @@ def _held(bursts: list[tuple[int, Burst]]) -> Rays:
     )
 
 
-def front_document(truth: State, sigma: float, rng: np.random.Generator) -> dict[str, Any]:
-    """The parts of a front LiDAR's calibration that a drive needs."""
+def front_document(truth: State, sigma_m: float, rng: np.random.Generator) -> dict[str, Any]:
+    """A front LiDAR's calibration by boards that told its range offset to `sigma_m` and no more."""
     row = np.zeros(CORRECTIONS)
-    row[0] = truth.corrections[0, 0] + rng.normal(0, sigma)
+    row[0] = truth.corrections[0, 0] + rng.normal(0, sigma_m)
     sigmas = MAKER.copy()
-    sigmas[0] = sigma
-    return {"corrections": corrections_document(row), "sigmas": corrections_document(sigmas)}
-
-
-def drawing_extrinsics(drawn: Array) -> dict[str, Any]:
-    """Extrinsics of the drawing."""
+    sigmas[0] = sigma_m
+    rig = nominal_rig(100, 100)
+    counts = ("views", "views_refused", "returns", "inliers", "starts", "starts_agreed")
+    rms = ("board_plane_rms_m", "range_sigma_m", "reprojection_rms_px", "corner_sigma_px")
+    witnesses = ("split_half_deg", "split_half_mm", "closed_form_deg", "closed_form_mm")
+    poses = ("left_from_right", *(f"lidar_front_from_{name}" for name in CAMERAS))
     return {
-        f"rig_from_{name}": {**to_json(pose), "sigma_rad": DRAWN_RAD, "sigma_m": DRAWN_M}
-        for name, pose in zip(LIDARS, drawn, strict=True)
+        "schema": "front_lidar_calibration",
+        "cameras": {name: rig.cameras[name].to_json() for name in CAMERAS},
+        **{name: to_json(np.eye(4)) for name in poses},
+        "corrections": corrections_document(row),
+        "sigmas": corrections_document(sigmas),
+        "covariances": {
+            **{name: np.eye(9).tolist() for name in CAMERAS},
+            **{name: np.eye(6).tolist() for name in poses},
+            "together": np.eye(30).tolist(),
+        },
+        "views": [],
+        "quality": dict.fromkeys(counts, 0) | dict.fromkeys((*rms, *witnesses), 0.0),
+        "verdict": {"passed": True, "reasons": []},
     }
+
+
+def drawing_document(drawn: Array) -> dict[str, Any]:
+    """The drawing of the simulated car with mountings (2, 4, 4)."""
+    document = drawing("tiny")
+    for name, pose in zip(LIDARS, drawn, strict=True):
+        sigmas = {"sigma_rad": DRAWN_RAD, "sigma_m": DRAWN_M}
+        document["extrinsics"][f"rig_from_{name}"] = {**to_json(pose), **sigmas}
+    return document

@@ -138,15 +138,18 @@ def _check_length(rays: Rays, imu: Imu, least_s: float, drive: Path) -> None:
 
 
 def _check_drawing(document: Mapping[str, Any], most: float, drawing: Path) -> None:
-    """No mounting is farther off the drawing than its sigmas allow."""
-    for name, pose in (("imu", "rig_from_lidar_front"), ("rear", "rig_from_lidar_rear")):
-        for part, unit in (("rotation", "about"), ("translation", "along")):
-            off = [abs(value or 0.0) for value in document["observability"][name][f"{part}_off_sigmas"]]
-            k = int(np.argmax(off))
-            if off[k] > most:
-                raise CardError(
-                    f"{part} of {pose} is not that of the drawing",
-                    where=drawing,
-                    found=f"{off[k]:.1f} standard deviations off {unit} {AXES[k]}",
-                    wanted=f"at most {most:g}; was the sensor moved, or is the drawing another car's?",
-                )
+    """No pose is farther off the drawing than its sigmas allow; the farthest is named."""
+    off = {
+        (pose, part, k): abs(value or 0.0)
+        for name, pose in (("imu", "rig_from_lidar_front"), ("rear", "lidar_front_from_lidar_rear"))
+        for part in ("rotation", "translation")
+        for k, value in enumerate(document["observability"][name][f"{part}_off_sigmas"])
+    }
+    pose, part, k = max(off, key=lambda entry: off[entry])
+    if off[pose, part, k] > most:
+        raise CardError(
+            f"{part} of {pose} is not that of the drawing",
+            where=drawing,
+            found=f"{off[pose, part, k]:.1f} standard deviations off, in {AXES[k]}",
+            wanted=f"at most {most:g}; was a sensor moved, or is it the drawing of another car?",
+        )

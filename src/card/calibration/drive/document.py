@@ -1,6 +1,7 @@
 """The solution of a session's drive as document ``rear_and_imu_calibration``."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from card.calibration.drive.inertial_kernels import UPPER
 from card.calibration.drive.plane_kernels import CORRECTIONS
 from card.calibration.drive.rays import Rays
 from card.calibration.drive.start import FRONT, REAR, Alone
-from card.calibration.drive.state import corrections_document
+from card.calibration.drive.state import State, corrections_document
 from card.estimation.imu import Imu
 from card.geometry import inverse, to_json
 from card.recording.paths import LIDARS
@@ -41,33 +42,61 @@ def relative(mounted: Array) -> tuple[Array, Array]:
     return pose, by
 
 
-def observed(
-    found: Array, believed: Array, covariance: Array, information: Array, least: float
-) -> dict[str, Any]:
-    """Document of what a drive says of a mounting beside the drawing.
+@dataclass(frozen=True)
+class Knowledge:
+    """Covariances (6, 6) of a pose, translation first, in its target frame.
 
-    covariance (6, 6) : of the estimate, translation first, in the rig.  information (6,) : of the drawing,
-    rotation first.
+    drawn : by the drawing of the pose.  tied : by all drawings, as the LiDARs tie them together, without
+    what motion tells.  estimated : in the end.  off (6,) : estimate less drawing.
     """
-    off = in_target_frame(found) @ difference(believed, found)
-    prior = 1.0 / np.concatenate([information[3:], information[:3]])
-    share = 1.0 - np.diag(covariance) / prior
-    # An estimate that the drawing holds back by 1 - share is off it by no more than this.
-    may = np.sqrt(prior * np.maximum(share, NOTHING))
-    sigmas = [float(o / m) if s > NOTHING else None for o, m, s in zip(off, may, share, strict=True)]
-    sigma = np.sqrt(np.diag(covariance))
-    document: dict[str, Any] = {
-        "drawing_sigma_rad": float(np.sqrt(prior[3])),
-        "drawing_sigma_m": float(np.sqrt(prior[0])),
-    }
-    for name, unit, part in (("rotation", "rad", slice(3, 6)), ("translation", "m", slice(0, 3))):
-        document |= {
-            f"{name}_sigma_{unit}": sigma[part].tolist(),
-            f"{name}_share": share[part].tolist(),
-            f"{name}_off_sigmas": sigmas[part],
-            name: "drive" if share[part].min() >= least else "drawing",
-        }
-    return document
+
+    drawn: Array
+    tied: Array
+    estimated: Array
+    off: Array
+
+    def document(self, least: float) -> dict[str, Any]:
+        """What the drive says beside the drawings: a part is its own if it took `least` of each variance."""
+        estimated, tied = np.diag(self.estimated), np.diag(self.tied)
+        share = 1.0 - estimated / tied
+        # An estimate that is part drawing differs from it by what of its variance has gone.
+        gone = np.diag(self.drawn) - estimated
+        sure = gone > NOTHING * np.diag(self.drawn)
+        sigmas = [float(o / np.sqrt(g)) if s else None for o, g, s in zip(self.off, gone, sure, strict=True)]
+        document: dict[str, Any] = {}
+        for name, unit, part in (("rotation", "rad", slice(3, 6)), ("translation", "m", slice(0, 3))):
+            document |= {
+                f"drawing_sigma_{unit}": np.sqrt(tied[part]).tolist(),
+                f"{name}_sigma_{unit}": np.sqrt(estimated[part]).tolist(),
+                f"{name}_share": share[part].tolist(),
+                f"{name}_off_sigmas": sigmas[part],
+                name: "drive" if share[part].min() >= least else "drawing",
+            }
+        return document
+
+
+def known_of_imu(state: State, priors: Priors, both: Array) -> Knowledge:
+    """rig_from_lidar_front.  both (12, 12) : covariance of the mountings, disturbed on their right."""
+    front = state.mounted[FRONT]
+    _, by = relative(state.mounted)
+    follows = -np.linalg.solve(by[:, 6:], by[:, :6])
+    drawn, rear = np.diag(priors.information(FRONT)), np.diag(priors.information(REAR))
+    turn = in_target_frame(front)
+    return Knowledge(
+        turn @ np.linalg.inv(drawn) @ turn.T,
+        turn @ np.linalg.inv(drawn + follows.T @ rear @ follows) @ turn.T,
+        turn @ both[:6, :6] @ turn.T,
+        turn @ difference(priors.mounted[FRONT], front),
+    )
+
+
+def known_of_rear(state: State, priors: Priors, both: Array) -> Knowledge:
+    """lidar_front_from_lidar_rear.  both (12, 12) : as for the IMU."""
+    pose, by = relative(state.mounted)
+    information = np.concatenate([priors.information(FRONT), priors.information(REAR)])
+    drawn = by @ np.diag(1.0 / information) @ by.T
+    off = in_target_frame(pose) @ difference(relative(priors.mounted)[0], pose)
+    return Knowledge(drawn, drawn, by @ both @ by.T, off)
 
 
 def rear_and_imu_document(
@@ -106,20 +135,8 @@ def rear_and_imu_document(
         },
         "imu": _imu(solution, sigma[12 + 2 * CORRECTIONS :]),
         "observability": {
-            "imu": observed(
-                front,
-                priors.mounted[FRONT],
-                placed[:6, :6],
-                priors.information(FRONT),
-                settings["observed_share"],
-            ),
-            "rear": observed(
-                rear,
-                priors.mounted[REAR],
-                placed[6:, 6:],
-                priors.information(REAR),
-                settings["observed_share"],
-            ),
+            "imu": known_of_imu(state, priors, both).document(settings["observed_share"]),
+            "rear": known_of_rear(state, priors, both).document(settings["observed_share"]),
             "gyro_rms_rad_s": imu.gyro.std(axis=0).tolist(),
             "accel_rms_m_s2": imu.accel.std(axis=0).tolist(),
         },

@@ -11,6 +11,8 @@ Integers = NDArray[np.int64]
 
 #: Fits of a voxel's plane, each without what lies more than TRIM standard deviations off the one before.
 _FITS, TRIM = 3, 3.0
+#: Standard deviations by which points of a voxel must scatter more than they should to be believed less.
+SURE = 3.0
 CHANNELS = 32
 #: Parameters of a LiDAR's corrections: common range offset; range, elevation and azimuth offset a channel.
 CORRECTIONS = 1 + 3 * CHANNELS
@@ -147,6 +149,27 @@ def derivatives(
 
 
 @numba.njit(cache=True, nogil=True)
+def pose_at(dense: Array, at: int, share: float, pose: Array) -> None:
+    """The pose (3, 4) that lies `share` of the way from one of dense (D, 4, 4) to the next."""
+    for i in range(3):
+        for j in range(4):
+            pose[i, j] = (1.0 - share) * dense[at, i, j] + share * dense[at + 1, i, j]
+
+
+@numba.njit(cache=True, nogil=True)
+def beam(point: Array, pose: Array, mounted: Array, direction: Array) -> float:
+    """Length of the ray to a point (3,) of the sensor, whose unit direction (3,) in the world is set."""
+    away, in_rig = 0.0, np.empty(3)
+    for i in range(3):
+        in_rig[i] = mounted[i, 0] * point[0] + mounted[i, 1] * point[1] + mounted[i, 2] * point[2]
+        away += point[i] ** 2
+    away = np.sqrt(away)
+    for i in range(3):
+        direction[i] = (pose[i, 0] * in_rig[0] + pose[i, 1] * in_rig[1] + pose[i, 2] * in_rig[2]) / away
+    return away
+
+
+@numba.njit(cache=True, nogil=True)
 def add_planes(
     order: Integers, starts: Integers, world: Array, points: Array, lidar: NDArray[np.int8],
     ring: NDArray[np.uint8], at: Integers, share: Array, knot: Integers, knot_share: Array, dense: Array,
@@ -156,8 +179,9 @@ def add_planes(
 
     order (N,) : points sorted by voxel, of which voxel v has starts[v] to starts[v + 1].
     first (4,) : columns of the mountings and the corrections, of each LiDAR.
-    limits : fewest points, most thickness, least width (m), floor of sigma (m), cut of Tukey's kernel
-        (sigmas), points that a plane counts as at most.
+    limits : fewest points, most thickness, least width (m), sigmas of a surface about its plane and of a
+        range (m), cut of Tukey's kernel (sigmas), points that a plane counts as at most. A voxel whose points
+        scatter more than these sigmas say is believed less.
     G (3 V, P), b (3 V,) : rows that are to be subtracted, H - G^T G and g - G^T b: what the planes' own
         three parameters, which nobody asks for, take away.
     found (2, STATISTICS) : see there; is added to.
@@ -165,6 +189,7 @@ def add_planes(
     """
     frame, mean, scatter, pose = np.empty((3, 3)), np.empty(3), np.empty((3, 3)), np.empty((3, 4))
     J, columns, places, a = np.empty(NONZERO), np.empty(NONZERO, np.int64), np.empty(4, np.int64), np.ones(3)
+    ray, likely = np.empty(3), np.empty(3)
     planes = 0
     for v in range(len(starts) - 1):
         rows = order[starts[v] : starts[v + 1]]
@@ -173,32 +198,52 @@ def add_planes(
         used, thick, wide = fit_plane(world, rows, frame, mean, scatter)
         if used < limits[0] or thick > limits[1] or wide < limits[2]:
             continue
-        sigma = max(thick, limits[3])
-        weight = min(1.0, limits[5] / used) / sigma**2
+        variances, squares, inside = np.empty(len(rows)), 0.0, 0
+        for n in range(len(rows)):
+            row = rows[n]
+            pose_at(dense, at[row], share[row], pose)
+            beam(points[row], pose, mounted[lidar[row]], ray)
+            cosine = ray[0] * frame[0, 0] + ray[1] * frame[1, 0] + ray[2] * frame[2, 0]
+            variances[n] = limits[3] ** 2 + (limits[4] * cosine) ** 2
+            e = 0.0
+            for i in range(3):
+                e += (world[row, i] - mean[i]) * frame[i, 0]
+            if abs(e) < TRIM * thick:
+                squares += e * e / variances[n]
+                inside += 1
+        excess = squares / inside
+        if excess < 1.0 + SURE * np.sqrt(2.0 / inside):
+            excess = 1.0
+        weight = min(1.0, limits[6] / used)
         N, top = np.zeros((3, 3)), 3 * planes
         G[top : top + 3] = 0.0
         b[top : top + 3] = 0.0
-        for row in rows:
+        for n in range(len(rows)):
+            row, variance = rows[n], excess * variances[n]
             d0, d1, d2 = world[row, 0] - mean[0], world[row, 1] - mean[1], world[row, 2] - mean[2]
             e = d0 * frame[0, 0] + d1 * frame[1, 0] + d2 * frame[2, 0]
             which = lidar[row]
             found[which, 0] += 1.0
-            u = (e / (limits[4] * sigma)) ** 2
+            u = e * e / (limits[5] ** 2 * variance)
             if u >= 1.0:
                 continue
             found[which, 1] += 1.0
             found[which, 2] += e * e
-            w = weight * (1.0 - u) ** 2
-            s, low, high = share[row], dense[at[row]], dense[at[row] + 1]
+            w = weight * (1.0 - u) ** 2 / variance
+            pose_at(dense, at[row], share[row], pose)
+            away = beam(points[row], pose, mounted[which], ray)
+            cosine = ray[0] * frame[0, 0] + ray[1] * frame[1, 0] + ray[2] * frame[2, 0]
+            # Noise of a range moves a point along the plane, too: taken where it was measured, the plane
+            # would lean towards the sensor. It is taken where its range most likely ends.
+            longer = e * limits[4] ** 2 * cosine / variances[n]
             for i in range(3):
-                for j in range(4):
-                    pose[i, j] = (1.0 - s) * low[i, j] + s * high[i, j]
+                likely[i] = points[row, i] * (1.0 - longer / away)
             places[0], places[1] = _POSE * knot[row], _POSE * knot[row] + _POSE
             places[2], places[3] = first[which], first[2 + which]
             derivatives(
-                points[row], pose, mounted[which], frame[:, 0], int(ring[row]), places, knot_share[row],
-                columns, J,
-            )  # fmt: skip
+                likely, pose, mounted[which], frame[:, 0], int(ring[row]), places, knot_share[row], columns, J
+            )
+            d0, d1, d2 = d0 - longer * ray[0], d1 - longer * ray[1], d2 - longer * ray[2]
             a[1] = (d0 * frame[0, 1] + d1 * frame[1, 1] + d2 * frame[2, 1]) / wide
             a[2] = (d0 * frame[0, 2] + d1 * frame[1, 2] + d2 * frame[2, 2]) / wide
             for i in range(NONZERO):

@@ -28,9 +28,9 @@ _TOGETHER = 512
 class PlaneLimits:
     """When points of a voxel are a plane, and how they count.
 
-    thickness_m : greatest sigma across.  width_m : least sigma along its narrower side.  sigma_m : floor of a
-    residual's sigma.  kernel_sigmas : cut of Tukey's kernel.  count : points that those of a plane count as
-    at most, for they share errors of its shape.
+    thickness_m : greatest sigma across.  width_m : least sigma along its narrower side.  sigma_m : of a
+    surface about its plane.  range_m : sigma of a range.  kernel_sigmas : cut of Tukey's kernel.  count :
+    points that those of a plane count as at most, for they share errors of its shape.
     """
 
     leaf_m: float
@@ -38,6 +38,7 @@ class PlaneLimits:
     thickness_m: float
     width_m: float
     sigma_m: float
+    range_m: float
     kernel_sigmas: float
     count: float
 
@@ -50,6 +51,7 @@ class PlaneLimits:
             thickness_m=thickness_m,
             width_m=settings["min_plane_width_m"],
             sigma_m=settings["plane_sigma_m"],
+            range_m=settings["range_sigma_m"],
             kernel_sigmas=settings["kernel_sigmas"],
             count=settings["plane_points"],
         )
@@ -118,6 +120,7 @@ class Returns:
                 limits.thickness_m,
                 limits.width_m,
                 limits.sigma_m,
+                limits.range_m,
                 limits.kernel_sigmas,
                 limits.count,
             ]
