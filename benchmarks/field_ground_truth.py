@@ -43,7 +43,7 @@ def inputs_of(field: Field, folder: Path | None = None) -> Inputs:
     )
     if not inputs.ego_mask.is_file():
         folder.mkdir(parents=True, exist_ok=True)
-        bursts = _bursts(field.recording)
+        bursts = bursts_of(field.recording)
         write_table(inputs.bursts, bursts, "bursts")
         write_table(inputs.frames, _frames(bursts), "frames")
         size = read_json(field.calibration, "calibration")["camera_left_undistorted"]
@@ -51,7 +51,8 @@ def inputs_of(field: Field, folder: Path | None = None) -> Inputs:
     return inputs
 
 
-def _bursts(recording: Path) -> dict[str, list[object]]:
+def bursts_of(recording: Path) -> dict[str, list[object]]:
+    """The columns of schema ``bursts`` of a recording whose points are in the order of firing."""
     rows: dict[str, list[object]] = {
         name: [] for name in ("lidar", "burst", "t_start_ns", "t_end_ns", "points", "file")
     }
@@ -59,7 +60,7 @@ def _bursts(recording: Path) -> dict[str, list[object]]:
         for number, file in enumerate(sorted((recording / lidar).glob("*.laz"))):
             with laspy.open(file) as reader:
                 count = reader.header.point_count
-                # In the order of firing: the last point tells the end, and its chunk alone is read.
+                # The last point tells the end, and its chunk alone is read.
                 reader.seek(count - 1)
                 last = int(reader.read_points(1)["offset_ns"][0])
             t_ns = int(file.stem)

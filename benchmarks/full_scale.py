@@ -8,17 +8,16 @@ from pathlib import Path
 from typing import Any
 
 from field import field_drive
+from field_ground_truth import bursts_of
 
 from card.artifacts import default_settings, read_json, read_table, write_table
 from card.artifacts.masks import write_ego_mask
 from card.geometry import Trajectory
 from card.ground_truth.left_camera import LeftCamera
 from card.ground_truth.sweeps import Drive
-from card.recording.ingest.bursts import check_bursts
-from card.recording.paths import LIDARS
 from card.simulation.sessions import delivered_mask
 
-DRIVE, SEED, SECONDS = "de_town_bumps", 1, 82.0
+DRIVE, SEED, SECONDS = "it_town_loop", 1, 75.0
 SETTINGS = {"rear_crop": "rear_half"}
 
 
@@ -36,24 +35,8 @@ def open_drive(scratch: Path) -> FullScale:
     source = field_drive(DRIVE, SEED, SECONDS)
     document = read_json(source.calibration, "calibration")
     settings = {**default_settings("ground_truth"), **SETTINGS}
-    _write_bursts(source.recording, scratch / "bursts.parquet")
+    write_table(scratch / "bursts.parquet", bursts_of(source.recording), "bursts")
     write_ego_mask(scratch / "ego_mask.png", delivered_mask(document))
     poses = Trajectory.from_table(read_table(source.truth / "trajectory.parquet", "trajectory"))
     drive = Drive(source.recording, scratch / "bursts.parquet", document, poses, settings)
     return FullScale(drive, LeftCamera(document, scratch / "ego_mask.png"), settings)
-
-
-def _write_bursts(recording: Path, path: Path) -> None:
-    columns: dict[str, list[Any]] = {
-        name: [] for name in ("lidar", "burst", "t_start_ns", "t_end_ns", "points", "file")
-    }
-    for lidar in LIDARS:
-        files = sorted((recording / lidar).glob("*.laz"))
-        times = check_bursts(lidar, files, default_settings("ingest")["burst_overlap_ns"])
-        columns["lidar"] += [lidar] * len(times)
-        columns["burst"] += range(len(times))
-        columns["t_start_ns"] += times.start_ns.tolist()
-        columns["t_end_ns"] += times.end_ns.tolist()
-        columns["points"] += times.points.tolist()
-        columns["file"] += [f"{lidar}/{file.name}" for file in files]
-    write_table(path, columns, "bursts")

@@ -29,7 +29,7 @@ ABLATION: Mapping[str, Mapping[str, Any]] = {
     "adaptive": {"flow_method": "off"},
     "literal": {"flow_method": "literal"},
     "submap": {"flow_method": "submap"},
-    "votes_alone": {"brief_looks": 0, "passes_per_hit": 0, "attached_voxels": 0},
+    "votes_alone": {"vacated_votes": 0, "brief_looks": 0, "passes_per_hit": 0, "attached_voxels": 0},
     "voxel_15cm": {"voxel_size_m": 0.15},
     "voxel_20cm": {"voxel_size_m": 0.2},
 }

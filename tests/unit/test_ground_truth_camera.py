@@ -1,9 +1,12 @@
 import numpy as np
 import pytest
 from ground_truth_scene import calibration, write_mask
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from card.errors import CardError
 from card.ground_truth.left_camera import LeftCamera
+from card.ground_truth.raster_order import raster_order
 
 
 @pytest.fixture
@@ -82,3 +85,14 @@ def test_raster_order_decides_ties_of_depth_by_x_and_y(camera):
     expected = np.lexsort((y, x, z, column, row))
     assert np.array_equal(points[index], points[index][expected])
     assert np.array_equal(pixels, pixels[expected])
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.tuples(*[st.integers(0, 3)] * 5), max_size=60))
+def test_points_are_saved_by_row_column_depth_x_and_y(rows):
+    table = np.array(rows, dtype=np.int64).reshape(-1, 5)
+    points, (column, row) = table[:, :3] * 0.1 + 1, table[:, 3:].T
+    order = raster_order(points, column, row)
+    plain = np.lexsort((points[:, 1], points[:, 0], points[:, 2], column, row))
+    assert np.array_equal(np.sort(order), np.arange(len(points)))
+    assert np.array_equal(table[order], table[plain])

@@ -5,7 +5,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from card.artifacts import default_settings
-from card.ground_truth.dynamic_voxels import attached, contradicted, is_brief, looked_through, seldom_hit
+from card.ground_truth.dynamic_voxels import (
+    attached,
+    contradicted,
+    is_brief,
+    looked_through,
+    seldom_hit,
+    vacated,
+)
 from card.ground_truth.reference.attached import attached as plain_attached
 from card.ground_truth.visibility_votes import Votes
 from card.ground_truth.voxels import pack
@@ -14,11 +21,10 @@ SETTINGS = default_settings("ground_truth")
 S_NS = 1_000_000_000
 
 
-def votes(
-    *, hits: list[int], beside: list[int], moved: list[int], elsewhen: list[int] | None = None
-) -> Votes:
-    columns = (hits, beside, moved, elsewhen or [0] * len(hits))
-    return Votes(*(np.array(column, dtype=np.int32) for column in columns))
+def votes(**given: list[int]) -> Votes:
+    count = len(next(iter(given.values())))
+    names = ("hits", "beside", "moved", "elsewhen", "moved_elsewhen")
+    return Votes(*(np.array(given.get(name, [0] * count), dtype=np.int32) for name in names))
 
 
 def test_contradiction_may_be_larger_where_quotas_are_met():
@@ -34,12 +40,19 @@ def test_a_voxel_is_seldom_hit_if_most_sweeps_look_past_it():
     assert not seldom_hit(some, SETTINGS | {"passes_per_hit": 0}).any()
 
 
+def test_what_stood_for_long_and_is_gone_is_dynamic():
+    some = votes(hits=[60, 60], moved=[9, 4], moved_elsewhen=[3, 4])
+    assert not contradicted(some, np.zeros(2, bool), SETTINGS).any()
+    assert vacated(some, SETTINGS).tolist() == [False, True]
+    assert not vacated(some, SETTINGS | {"vacated_votes": 0}).any()
+
+
 def test_a_brief_voxel_that_is_looked_through_at_other_times_is_dynamic():
     first = np.array([0, 0, 5 * S_NS])
     last = first + np.array([4, 5, 0]) * 100_000_000
     brief = is_brief((first, last), SETTINGS)
     assert brief.tolist() == [True, False, True]
-    some = votes(hits=[1, 1, 1], beside=[3, 9, 2], moved=[0, 0, 0], elsewhen=[3, 9, 2])
+    some = votes(hits=[1, 1, 1], beside=[6, 9, 5], elsewhen=[6, 9, 5])
     assert looked_through(some, brief, SETTINGS).tolist() == [True, False, False]
     assert not looked_through(some, brief, SETTINGS | {"brief_looks": 0}).any()
 

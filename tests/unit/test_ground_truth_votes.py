@@ -73,7 +73,7 @@ def random_drive(seed: int, sweeps: int = 5) -> StandingDrive:
 
 
 def brute_votes(drive, voxels, chosen, surface) -> np.ndarray:
-    votes = np.zeros((4, len(chosen)), dtype=int)
+    votes = np.zeros((5, len(chosen)), dtype=int)
     found = [np.flatnonzero([(GRID.keys(c) == voxels.keys[v]).any() for c in drive.clouds]) for v in chosen]
     margin = int(SETTINGS["support_margin_s"] * 1e9)
     for i, cloud in enumerate(drive.clouds):
@@ -105,7 +105,7 @@ def brute_votes(drive, voxels, chosen, surface) -> np.ndarray:
             clear = (np.abs((cloud - c) @ n) > 0.1) & (np.abs(d @ n) > 0.12)
             moved = (passing & (lengths - t >= 0.3) & (clear | ~surface.planar[k])).any()
             votes[2, k] += moved
-            votes[3, k] += moved and elsewhen
+            votes[3:, k] += moved and elsewhen
     return votes
 
 
@@ -122,6 +122,7 @@ def test_plain_votes_equal_a_search_over_all_rays_and_voxels(seed):
     assert votes.beside.tolist() == wanted[1].tolist()
     assert votes.moved.tolist() == wanted[2].tolist()
     assert votes.elsewhen.tolist() == wanted[3].tolist()
+    assert votes.moved_elsewhen.tolist() == wanted[4].tolist()
     assert wanted.sum(axis=1).min() >= 3
 
 
@@ -131,7 +132,7 @@ def assert_same_votes(drive, chosen=None, **changed) -> Votes:
     sweeps = range(len(drive.clouds))
     votes = visibility_votes(drive, sweeps, voxels, chosen, filled)
     plain = plain_votes(drive, sweeps, voxels, chosen, filled)
-    for name in ("hits", "beside", "moved", "elsewhen"):
+    for name in ("hits", "beside", "moved", "elsewhen", "moved_elsewhen"):
         assert np.array_equal(getattr(votes, name), getattr(plain, name)), name
     return votes
 

@@ -40,6 +40,17 @@ def seldom_hit(votes: Votes, settings: Mapping[str, Any]) -> Mask:
     return seldom & (votes.moved >= 1)
 
 
+def vacated(votes: Votes, settings: Mapping[str, Any]) -> Mask:
+    """Voxels (C,) with `vacated_votes` moved votes or more before the first or after the last hit.
+
+    What stood there for long and then left (a car that waits) gets few moved votes a comparison.
+    """
+    if not settings["vacated_votes"]:
+        return np.zeros(len(votes.moved), dtype=np.bool_)
+    gone: Mask = votes.moved_elsewhen >= settings["vacated_votes"]
+    return gone
+
+
 def is_brief(hit: tuple[Index, Index], settings: Mapping[str, Any]) -> Mask:
     """Voxels whose first and last returns (C,), (C,) ns, of the drive lie within `brief_s`."""
     brief: Mask = hit[1] - hit[0] <= settings["brief_s"] * 1e9

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from card.artifacts.masks import read_ego_mask
 from card.geometry import CameraModel, from_json
+from card.ground_truth.raster_order import raster_order
 
 Points = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -72,22 +73,9 @@ class LeftCamera:
         """
         pixels = self.image.project(points)
         on = np.flatnonzero(self.image.contains(pixels) & self.in_view(points, 0.0, 0.0))
-        column, row = np.rint(pixels[on]).astype(np.int64).T
-        order = _raster_order(points[on], row * self.image.width + column)
+        column, row = np.ascontiguousarray(np.rint(pixels[on]).astype(np.int64).T)
+        order = raster_order(points[on], column, row)
         return on[order], np.stack([column, row], axis=1)[order]
-
-
-def _raster_order(points: Points, pixel: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
-    """The order of points (N, 3), z >= 0, by pixel, depth, x and y."""
-    # Floats that are not negative sort as their bits do, so nearly all is decided by one whole number.
-    packed = (pixel << 32) | points[:, 2].astype(np.float32).view(np.int32)
-    order = np.argsort(packed)
-    same = np.diff(packed[order]) == 0
-    tied = np.flatnonzero(np.r_[same, False] | np.r_[False, same])
-    rest = order[tied]
-    x, y, z = points[rest].T
-    order[tied] = rest[np.lexsort((y, x, z, packed[rest]))]
-    return order
 
 
 def _border(width: int, height: int) -> Points:

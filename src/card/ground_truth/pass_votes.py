@@ -23,7 +23,7 @@ _MORE = 2.0
 _STEP = 1e-7
 FLAT = 1e-10
 #: Columns of the votes.
-HIT, BESIDE, MOVED, ELSEWHEN = 0, 1, 2, 3
+HIT, BESIDE, MOVED, ELSEWHEN, MOVED_ELSEWHEN = 0, 1, 2, 3, 4
 #: What is known of a voxel in one sweep.
 _FREE, _DONE, _UNKNOWN = 1, 2, 0
 
@@ -75,7 +75,7 @@ def sweep_votes(
     rule: PassRule,
     votes: Ints,
 ) -> None:
-    """Add the votes of one sweep at a time, at most one a voxel, to `votes` (C, 4)."""
+    """Add the votes of one sweep at a time, at most one a voxel, to `votes` (C, 5)."""
     touched = _enter_returns(sweep, points, origins, size, region, rule, votes)
     for i in range(len(points)):
         _walk(sweep, t_ns, points[i], origins[i], size, region, rule, votes)
@@ -238,7 +238,9 @@ def _look(
         if abs(off) <= rule.residual_m or abs(nx * dx + ny * dy + nz * dz) <= rule.incidence:
             return
     votes[c, MOVED] += 1
-    votes[c, ELSEWHEN] += t_ns < region.begin[v] or t_ns > region.end[v]
+    if t_ns < region.begin[v] or t_ns > region.end[v]:
+        votes[c, ELSEWHEN] += 1
+        votes[c, MOVED_ELSEWHEN] += 1
     region.known[v] = 3 * sweep + _DONE
 
 

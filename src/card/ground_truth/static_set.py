@@ -10,7 +10,14 @@ import numpy as np
 import numpy.typing as npt
 
 from card.artifacts import progress
-from card.ground_truth.dynamic_voxels import attached, contradicted, is_brief, looked_through, seldom_hit
+from card.ground_truth.dynamic_voxels import (
+    attached,
+    contradicted,
+    is_brief,
+    looked_through,
+    seldom_hit,
+    vacated,
+)
 from card.ground_truth.icp_flow import dynamic_by_flow, flow_votes
 from card.ground_truth.quotas import meets_quotas
 from card.ground_truth.sweeps import Drive
@@ -84,6 +91,7 @@ def _dynamic_by_visibility(
     dynamic, reasons = np.zeros(len(chosen), dtype=np.bool_), {}
     for reason, found in (
         ("contradicted", contradicted(votes, quotas_met, settings)),
+        ("vacated", vacated(votes, settings)),
         ("looked_through", looked_through(votes, brief, settings)),
         ("seldom_hit", seldom_hit(votes, settings)),
     ):

@@ -34,13 +34,15 @@ _REACH_M = 20.0
 class Votes:
     """Votes of C voxels, at most one a sweep: hits, passes beside a return of the same sweep, moved.
 
-    elsewhen: those of the latter two that are of a time at which nothing hit the voxel.
+    elsewhen: those of the latter two that are of a time at which nothing hit the voxel; moved_elsewhen: of
+    the last.
     """
 
     hits: npt.NDArray[np.int32]
     beside: npt.NDArray[np.int32]
     moved: npt.NDArray[np.int32]
     elsewhen: npt.NDArray[np.int32]
+    moved_elsewhen: npt.NDArray[np.int32]
 
     @property
     def comparisons(self) -> npt.NDArray[np.int32]:
@@ -88,7 +90,7 @@ def visibility_votes(
     votes see. `reference.visibility_votes` is the same in plain numpy.
     """
     rules = _rules(settings)
-    votes = np.zeros((len(chosen), 4), dtype=np.int32)
+    votes = np.zeros((len(chosen), 5), dtype=np.int32)
     margin_ns = int(settings["support_margin_s"] * 1e9)
     tiles = _Tiles(voxels)
     region, target, centre = None, None, np.full(3, np.inf)

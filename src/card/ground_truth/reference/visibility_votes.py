@@ -27,7 +27,7 @@ def visibility_votes(
     """See `ground_truth.visibility_votes.visibility_votes`."""
     keys, size = voxels.keys[chosen], voxels.grid.size
     surface = local_planes(voxels, chosen, settings)
-    votes = Votes(*(np.zeros(len(chosen), dtype=np.int32) for _ in range(4)))
+    votes = Votes(*(np.zeros(len(chosen), dtype=np.int32) for _ in range(5)))
     first, last = hit_times(drive, voxels, chosen)
     margin_ns = int(settings["support_margin_s"] * 1e9)
     for i in sweeps:
@@ -77,6 +77,7 @@ def visibility_votes(
         seen, t_ns = np.union1d(near, moved_from), drive.end_ns[i]
         elsewhen = (t_ns < first[seen] - margin_ns) | (t_ns > last[seen] + margin_ns)
         votes.elsewhen[seen[elsewhen]] += 1
+        votes.moved_elsewhen[np.intersect1d(seen[elsewhen], moved_from)] += 1
     return votes
 
 
