@@ -35,15 +35,15 @@ def test_contradiction_may_be_larger_where_quotas_are_met():
 
 
 def test_a_voxel_is_seldom_hit_if_most_sweeps_look_past_it():
-    some = votes(hits=[1, 1, 1, 2, 0], beside=[7, 8, 6, 8, 7], moved=[1, 0, 1, 1, 1])
+    some = votes(hits=[1, 1, 1, 2, 0], beside=[11, 12, 10, 12, 11], moved=[1, 0, 1, 1, 1])
     assert seldom_hit(some, SETTINGS).tolist() == [True, False, False, False, True]
     assert not seldom_hit(some, SETTINGS | {"passes_per_hit": 0}).any()
 
 
 def test_what_stood_for_long_and_is_gone_is_dynamic():
-    some = votes(hits=[60, 60], moved=[9, 4], moved_elsewhen=[3, 4])
-    assert not contradicted(some, np.zeros(2, bool), SETTINGS).any()
-    assert vacated(some, SETTINGS).tolist() == [False, True]
+    some = votes(hits=[60] * 3, moved=[9, 6, 6], elsewhen=[5, 12, 13], moved_elsewhen=[5, 6, 6])
+    assert not contradicted(some, np.zeros(3, bool), SETTINGS).any()
+    assert vacated(some, SETTINGS).tolist() == [False, True, False]
     assert not vacated(some, SETTINGS | {"vacated_votes": 0}).any()
 
 
@@ -52,8 +52,10 @@ def test_a_brief_voxel_that_is_looked_through_at_other_times_is_dynamic():
     last = first + np.array([4, 5, 0]) * 100_000_000
     brief = is_brief((first, last), SETTINGS)
     assert brief.tolist() == [True, False, True]
-    some = votes(hits=[1, 1, 1], beside=[6, 9, 5], elsewhen=[6, 9, 5])
+    some = votes(hits=[1, 1, 1], beside=[5, 8, 4], elsewhen=[6, 9, 5], moved_elsewhen=[1, 1, 1])
     assert looked_through(some, brief, SETTINGS).tolist() == [True, False, False]
+    never_moved = votes(elsewhen=[9, 9, 9])
+    assert not looked_through(never_moved, brief, SETTINGS).any()
     assert not looked_through(some, brief, SETTINGS | {"brief_looks": 0}).any()
 
 

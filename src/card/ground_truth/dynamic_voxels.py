@@ -43,12 +43,13 @@ def seldom_hit(votes: Votes, settings: Mapping[str, Any]) -> Mask:
 def vacated(votes: Votes, settings: Mapping[str, Any]) -> Mask:
     """Voxels (C,) with `vacated_votes` moved votes or more before the first or after the last hit.
 
+    These must be half or more of the looks at those times.
     What stood there for long and then left (a car that waits) gets few moved votes a comparison.
     """
     if not settings["vacated_votes"]:
         return np.zeros(len(votes.moved), dtype=np.bool_)
     gone: Mask = votes.moved_elsewhen >= settings["vacated_votes"]
-    return gone
+    return gone & (2 * votes.moved_elsewhen >= votes.elsewhen)
 
 
 def is_brief(hit: tuple[Index, Index], settings: Mapping[str, Any]) -> Mask:
@@ -58,10 +59,10 @@ def is_brief(hit: tuple[Index, Index], settings: Mapping[str, Any]) -> Mask:
 
 
 def looked_through(votes: Votes, brief: Mask, settings: Mapping[str, Any]) -> Mask:
-    """Brief voxels (C,) that `brief_looks` sweeps or more looked through at another time."""
+    """Brief voxels (C,) that `brief_looks` sweeps or more looked through at another time, one as moved."""
     if not settings["brief_looks"]:
         return np.zeros(len(brief), dtype=np.bool_)
-    return brief & (votes.elsewhen >= settings["brief_looks"])
+    return brief & (votes.elsewhen >= settings["brief_looks"]) & (votes.moved_elsewhen >= 1)
 
 
 def attached(
