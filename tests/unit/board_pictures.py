@@ -5,7 +5,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from board_sessions import DAY
+from session_files import DAY
 
 from card.simulation.board_images import write_board_yaml
 from card.simulation.board_observations import board_places

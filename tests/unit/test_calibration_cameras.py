@@ -8,7 +8,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from board_sessions import (
+from session_files import (
     BOARD,
     NOISE_PX,
     Session,

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from board_sessions import (
+from session_files import (
     BOARD,
     Session,
     lidar_from,
