@@ -10,13 +10,16 @@ import numpy as np
 import pytest
 import yaml
 from board_pictures import picture, poses, small_rig, stamps, tones, write_picture, write_session
+from session_files import left_from_right
 
 from card.artifacts import default_settings, read_json, read_table
 from card.calibration import chessboard
+from card.calibration.cameras import calibrate_cameras
 from card.calibration.chessboard import find_chessboard
 from card.calibration.detect_boards import detect_boards
+from card.calibration.state import step_between
 from card.errors import CardError
-from card.geometry import apply, inverse
+from card.geometry import apply, from_json, inverse
 from card.simulation import board
 from card.simulation.board_images import write_board_yaml
 from card.simulation.quads import QuadView
@@ -191,8 +194,25 @@ def test_images_of_another_size_and_unreadable_ones_are_named(tmp_path: Path) ->
         run(session)
 
 
-def test_real_images_are_found_and_calibrated_within_published_figures() -> None:
-    """Six images of an automotive camera: OpenCV's figures over 22 of them are in the folder's SOURCE.txt."""
+def test_cameras_come_from_images_alone(tmp_path: Path) -> None:
+    session = write_session(tmp_path / "session", 14)
+    run(session)
+    calibrate_cameras(
+        boards=tmp_path / "boards.parquet",
+        board=session / "board.yaml",
+        cameras=tmp_path / "cameras.json",
+        report=tmp_path / "cameras.report.json",
+        settings=default_settings("calibration"),
+        gates=[],
+    )
+    document = read_json(tmp_path / "cameras.json", "camera_calibration")
+    error = step_between(left_from_right(small_rig()), from_json(document["left_from_right"]))
+    assert np.degrees(np.linalg.norm(error[3:])) < 0.06
+    assert np.linalg.norm(error[:3]) < 1.5e-3
+    assert document["quality"]["reprojection_rms_px"] < 0.15
+
+
+def test_real_images_are_found_and_parts_of_their_board_are_not() -> None:
     data = os.environ.get("CARD_TEST_DATA")
     if not data or not Path(data, "camera_chessboard").is_dir():
         pytest.skip("CARD_TEST_DATA has no camera_chessboard")

@@ -208,6 +208,12 @@ def test_a_session_of_walls_is_refused_and_a_view_named(session: Session) -> Non
         estimate(session, bursts)
 
 
+def test_sweeps_shifted_by_one_view_are_refused(session: Session) -> None:
+    bursts = session.observed.bursts[1:] + session.observed.bursts[:1]
+    with pytest.raises(CardError, match=r"too few views with returns of the board .*view 2000000000: "):
+        estimate(session, bursts)
+
+
 def test_a_drawing_that_is_degrees_off_will_do(session: Session) -> None:
     rng = np.random.default_rng(4)
     sigmas = [0.03] * 3 + [np.radians(1.5)] * 3
