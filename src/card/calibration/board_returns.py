@@ -48,7 +48,7 @@ def find_plane(
     lidar_from_board : (4, 4), expected; off by at most the slacks, m and rad.
     settings : section ``front_lidar`` of the stage's settings.
     """
-    left = np.flatnonzero(_near(points, lidar_from_board, board, slack_m))
+    left = np.flatnonzero(near_board(points, lidar_from_board, board, slack_m))
     least, reason = settings["min_returns"], "no returns of a plane where the board should be"
     expected = lidar_from_board[:3, 2]
     most_apart = np.cos(min(slack_rad + np.radians(_NORMAL_DEG), np.pi / 2))
@@ -80,7 +80,8 @@ def on_board(
     return inside & (np.abs(local[:, 2]) < settings["plane_tolerance_m"])
 
 
-def _near(points: Array, lidar_from_board: Array, board: Board, slack_m: float) -> NDArray[np.bool_]:
+def near_board(points: Array, lidar_from_board: Array, board: Board, slack_m: float) -> NDArray[np.bool_]:
+    """Which points (N, 3) are where the plate may be: (N,)."""
     local = np.abs(apply(inverse(lidar_from_board), points) - board.centre_m)
     return np.asarray((local < np.array([*(board.size_m / 2), 0.0]) + slack_m).all(axis=1))
 

@@ -40,10 +40,10 @@ def camera_from_board(pixels: Array, board: Board, intrinsics: Array) -> Array:
     """Pose (V, 4, 4) of the board in one camera, of the pixels (V, N, 2) of each view alone."""
     model = camera_model(intrinsics, 1, 1)
     poses = np.tile(np.eye(4), (len(pixels), 1, 1))
-    for pose, image in zip(poses, pixels, strict=True):
+    for number, (pose, image) in enumerate(zip(poses, pixels, strict=True), 1):
         found, turn, shift = cv2.solvePnP(board.corners_m, image, model.K, np.array(model.distortion))
         if not found:
-            raise CardError("no pose of the board fits its corners")
+            raise CardError("no pose of the board fits its corners", found=f"view {number} of {len(pixels)}")
         pose[:3, :3], pose[:3, 3] = cv2.Rodrigues(turn)[0], shift[:, 0]
     return poses
 

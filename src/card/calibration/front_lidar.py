@@ -11,7 +11,7 @@ from card.calibration.board import Board
 from card.calibration.board_views import read_board_views
 from card.calibration.lidar_document import figures_of, lidar_document
 from card.calibration.lidar_estimate import estimate_front_lidar
-from card.calibration.lidar_start import Drawn
+from card.calibration.lidar_start import Drawn, near_boards
 from card.calibration.session_sweeps import sweeps_of
 from card.calibration.state import CHANNELS, State, intrinsics_of
 from card.errors import CardError
@@ -62,15 +62,10 @@ def calibrate_front_lidar(
         np.zeros(1 + 3 * CHANNELS),
         np.array([from_json(used[name]["left_from_board"]) for name in views.names]),
     )
-    estimate = estimate_front_lidar(
-        views,
-        list(sweeps_of(session, views.t_ns.tolist())),
-        start,
-        pattern,
-        Drawn.of(read_json(drawing, "drawing")),
-        {**settings["front_lidar"], "corner_sigma_px": found["quality"]["corner_sigma_px"]},
-        session,
-    )
+    drawn = Drawn.of(read_json(drawing, "drawing"))
+    sweeps = near_boards(sweeps_of(session, views.t_ns.tolist()), start.left_from_board, pattern, drawn)
+    stated = {**settings["front_lidar"], "corner_sigma_px": found["quality"]["corner_sigma_px"]}
+    estimate = estimate_front_lidar(views, list(sweeps), start, pattern, drawn, stated, session)
     document = lidar_document(estimate, settings["front_lidar"])
     write_json(front_lidar, document, "front_lidar_calibration")
     quality = document["quality"]

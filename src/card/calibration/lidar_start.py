@@ -1,6 +1,6 @@
 """Where the estimation of the front LiDAR starts: the drawing, and the closed form over board planes."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from card.calibration.board import Board
-from card.calibration.board_returns import Plane, find_plane
+from card.calibration.board_returns import Plane, find_plane, near_board
 from card.calibration.plane_alignment import align_planes
 from card.calibration.state import moved
 from card.errors import CardError
@@ -40,6 +40,24 @@ class Drawn:
             float(np.hypot(left["sigma_rad"], lidar["sigma_rad"])),
         )
 
+    def slack_m(self, left_from_board: Array) -> float:
+        """How far a board at this pose (4, 4) may be from where the drawing has it."""
+        distance = float(np.linalg.norm(left_from_board[:3, 3]))
+        return _MARGIN_M + _SIGMAS * (self.sigma_m + self.sigma_rad * distance)
+
+
+def near_boards(
+    sweeps: Iterable[Burst | None], left_from_board: Array, board: Board, drawn: Drawn
+) -> Iterator[Burst | None]:
+    """The sweeps, each with only those returns that may be of the board: a session's fit into memory."""
+    for sweep, pose in zip(sweeps, left_from_board, strict=True):
+        if sweep is None:
+            yield None
+            continue
+        near = near_board(sweep.points, drawn.lidar_from_left @ pose, board, drawn.slack_m(pose))
+        columns = {name: getattr(sweep, name)[near] for name in ("points", "intensity", "ring", "offset_ns")}
+        yield Burst(t_ns=sweep.t_ns, **columns)
+
 
 def board_planes(
     sweeps: Sequence[Burst | None],
@@ -54,11 +72,10 @@ def board_planes(
     for sweep, pose in zip(sweeps, left_from_board, strict=True):
         plane, reason = None, "no sweep of the LiDAR at its time"
         if sweep is not None:
-            expected = drawn.lidar_from_left @ pose
-            distance = float(np.linalg.norm(pose[:3, 3]))
-            slack_m = _MARGIN_M + _SIGMAS * (drawn.sigma_m + drawn.sigma_rad * distance)
-            slack_rad = _SIGMAS * drawn.sigma_rad
-            plane, reason = find_plane(sweep.points, expected, board, slack_m, slack_rad, settings)
+            expected, slack_rad = drawn.lidar_from_left @ pose, _SIGMAS * drawn.sigma_rad
+            plane, reason = find_plane(
+                sweep.points, expected, board, drawn.slack_m(pose), slack_rad, settings
+            )
         planes.append(plane)
         reasons.append(reason)
     return planes, reasons
