@@ -132,8 +132,9 @@ def test_spread_of_repeated_fits_is_the_standard_deviation() -> None:
     arc = np.sort(np.concatenate([rng.uniform(0, 6, 400), rng.uniform(6, 12, 40)]))
     sideways = rng.uniform(-0.12, 0.12, arc.size)
     at, found = np.array([3.0, 9.0]), []
+    chosen = settings(knot_spacing_m=0.1, penalty=0.01)
     for _ in range(300):
-        profile, _, _ = fit_profile(arc, sideways, rng.normal(0, 0.004, arc.size), settings())
+        profile, _, _ = fit_profile(arc, sideways, rng.normal(0, 0.004, arc.size), chosen)
         found.append(profile.at(at))
     spread = np.std(found, axis=0)
     assert spread[1] > 2 * spread[0]
@@ -169,7 +170,7 @@ def test_outlier_clusters_do_not_pull() -> None:
     height[dust] = rng.uniform(0, 0.35, np.count_nonzero(dust))
     profile, weight = fit(arc, height)
     at = np.linspace(0.5, 39.5, 2000)
-    assert np.abs(profile.at(at) - bump(at)).max() < 5e-3
+    assert np.abs(profile.under(at, 0.24) - bump(at)).max() < 5e-3
     assert not weight[cluster & ~dust].any()
 
     soft, _ = fit(arc, height, settings(penalty_anneal_power=0.0))
