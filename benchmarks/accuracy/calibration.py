@@ -18,6 +18,8 @@ PAIRS = {
     "camera_lidar": ("rig_from_camera_left", "rig_from_lidar_front", 0.03, 3.0),
     "rear": ("rig_from_lidar_front", "rig_from_lidar_rear", 0.005, 1.0),
 }
+#: Of the front LiDAR in the rig, whose origin is the IMU: deg and mm.
+IMU_AIMS = 0.02, 6.0
 WHEEL_CONTACT_AIM_MM = 2.0
 
 
@@ -41,6 +43,7 @@ def rows(work: Path, truth: Path, sequences: Sequence[str]) -> list[dict[str, An
             errors[figure].append(value)
     aims = {f"{name}_deg": deg for name, (_, _, deg, _) in PAIRS.items()}
     aims |= {f"{name}_mm": mm for name, (_, _, _, mm) in PAIRS.items()}
+    aims["imu_deg"], aims["imu_mm"] = IMU_AIMS
     aims["wheel_contact_mm"] = WHEEL_CONTACT_AIM_MM
     return [
         {
@@ -62,12 +65,20 @@ def bundle_errors(found: Mapping[str, Any], true: Mapping[str, Any]) -> dict[str
         error = inverse(_between(true, one, other)) @ _between(found, one, other)
         errors[f"{name}_deg"] = angle_deg(error[:3, :3])
         errors[f"{name}_mm"] = 1e3 * float(np.linalg.norm(error[:3, 3]))
+    errors |= imu_errors(found, true)
     contacts = [
         np.subtract(found["wheels"][wheel]["contact_m"], true["wheels"][wheel]["contact_m"])
         for wheel in WHEELS
     ]
     errors["wheel_contact_mm"] = 1e3 * float(np.linalg.norm(contacts, axis=1).max())
     return errors
+
+
+def imu_errors(found: Mapping[str, Any], true: Mapping[str, Any]) -> dict[str, float]:
+    """Errors of where the IMU is in the front LiDAR: imu_deg and imu_mm."""
+    ours, theirs = (from_json(bundle["extrinsics"]["rig_from_lidar_front"]) for bundle in (found, true))
+    distance = float(np.linalg.norm(ours[:3, 3] - theirs[:3, 3]))
+    return {"imu_deg": angle_deg(ours[:3, :3] @ theirs[:3, :3].T), "imu_mm": 1e3 * distance}
 
 
 def angle_deg(rotation: NDArray[np.float64]) -> float:

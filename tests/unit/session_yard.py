@@ -12,12 +12,12 @@ from card.artifacts import write_table
 from card.calibration.drive.inertial_kernels import UPPER
 from card.calibration.drive.plane_kernels import CHANNELS, CORRECTIONS
 from card.calibration.drive.rays import Rays
-from card.calibration.drive.state import State, corrections_document
+from card.calibration.drive.state import State
 from card.estimation.imu import Imu, read_imu
 from card.geometry import Trajectory, quaternion_from_matrix, to_json
 from card.recording.burst import Burst
 from card.recording.laz import write_burst
-from card.recording.paths import CAMERAS, LIDARS
+from card.recording.paths import LIDARS
 from card.simulation.drawing import drawing
 from card.simulation.imu import ImuErrors, imu_times, measured_imu
 from card.simulation.lidar import CHANNEL_NS, PERIOD_NS, SPIN_PHASE_NS, directions
@@ -170,34 +170,6 @@ def _held(bursts: list[tuple[int, Burst]]) -> Rays:
         np.array([burst.end_ns for _, burst in bursts]),
         np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
     )
-
-
-def front_document(truth: State, sigma_m: float, rng: np.random.Generator) -> dict[str, Any]:
-    """A front LiDAR's calibration by boards that told its range offset to `sigma_m` and no more."""
-    row = np.zeros(CORRECTIONS)
-    row[0] = truth.corrections[0, 0] + rng.normal(0, sigma_m)
-    sigmas = MAKER.copy()
-    sigmas[0] = sigma_m
-    rig = nominal_rig(100, 100)
-    counts = ("views", "views_refused", "returns", "inliers", "starts", "starts_agreed")
-    rms = ("board_plane_rms_m", "range_sigma_m", "reprojection_rms_px", "corner_sigma_px")
-    witnesses = ("split_half_deg", "split_half_mm", "closed_form_deg", "closed_form_mm")
-    poses = ("left_from_right", *(f"lidar_front_from_{name}" for name in CAMERAS))
-    return {
-        "schema": "front_lidar_calibration",
-        "cameras": {name: rig.cameras[name].to_json() for name in CAMERAS},
-        **{name: to_json(np.eye(4)) for name in poses},
-        "corrections": corrections_document(row),
-        "sigmas": corrections_document(sigmas),
-        "covariances": {
-            **{name: np.eye(9).tolist() for name in CAMERAS},
-            **{name: np.eye(6).tolist() for name in poses},
-            "together": np.eye(30).tolist(),
-        },
-        "views": [],
-        "quality": dict.fromkeys(counts, 0) | dict.fromkeys((*rms, *witnesses), 0.0),
-        "verdict": {"passed": True, "reasons": []},
-    }
 
 
 def drawing_document(drawn: Array) -> dict[str, Any]:

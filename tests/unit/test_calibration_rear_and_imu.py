@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from session_yard import DRAWN_M, Yard, drawing_document, front_document, yard
+from session_yard import DRAWN_M, Yard, drawing_document, yard
 
 from card.artifacts import default_settings, read_json, write_json, write_table
 from card.calibration.drive.state import corrections_row
@@ -16,6 +16,8 @@ from card.calibration.rear_and_imu import calibrate_rear_and_imu
 from card.errors import CardError
 from card.geometry import from_json, inverse, to_json
 from card.recording.paths import LIDARS
+from card.simulation.board_knowledge import front_lidar_document
+from card.simulation.rig import LidarCorrections
 
 Array = NDArray[np.float64]
 
@@ -43,7 +45,8 @@ def write(scene: Yard, folder: Path) -> Path:
     """The stage's inputs for a drive."""
     scene.write(folder)
     write_json(folder / "drawing.json", drawing_document(scene.drawn), "drawing")
-    front = front_document(scene.truth, 5e-4, np.random.default_rng(0))
+    true = LidarCorrections(float(scene.truth.corrections[0, 0]))
+    front = front_lidar_document(true, 5e-4, np.random.default_rng(0))
     write_json(folder / "front_lidar.json", front, "front_lidar_calibration")
     return folder
 

@@ -114,10 +114,15 @@ def test_bundle_errors_are_those_put_in() -> None:
     assert errors["rear_mm"] == pytest.approx(4)
     assert errors["wheel_contact_mm"] == pytest.approx(3)
     assert errors["stereo_mm"] < 1e-9
+    assert errors["imu_mm"] < 1e-9
+    for name in ("front", "rear"):
+        found["extrinsics"][f"rig_from_lidar_{name}"]["translation_m"][1] += 0.002
+    assert module.bundle_errors(found, true)["imu_mm"] == pytest.approx(2)
+    assert module.bundle_errors(found, true)["rear_mm"] == pytest.approx(4)
     assert module.angle_deg(Rotation.from_rotvec([0, 1e-6, 0]).as_matrix()) == pytest.approx(np.degrees(1e-6))
 
 
 def test_missing_results_give_no_value(tmp_path: Path) -> None:
-    for stage, count in (("poses", 12), ("wheels", 9), ("calibration", 7)):
+    for stage, count in (("poses", 12), ("wheels", 9), ("calibration", 9)):
         rows = accuracy(stage).rows(tmp_path, tmp_path, ["nowhere"])
         assert [row["value"] for row in rows] == [None] * count
