@@ -74,7 +74,7 @@ def yard(
 ) -> Yard:
     """A round on a yard, over bumps; straight and level if not `lively`."""
     rng = np.random.default_rng(seed)
-    path = _path(seconds, lively)
+    path = path_of(seconds, lively)
     drawn = np.stack([nominal_rig(100, 100).rig_from[name] for name in LIDARS])
     mounted = np.stack([_built(pose, rng) for pose in drawn])
     corrections = rng.normal(size=(2, CORRECTIONS)) * MAKER
@@ -109,7 +109,7 @@ def yard(
     return Yard(_held(bursts), imu, truth, drawn, tuple(bursts), table)
 
 
-def _path(seconds: float, lively: bool) -> Trajectory:
+def path_of(seconds: float, lively: bool) -> Trajectory:
     """The rig's way at 1 kHz, a little longer than the drive at both ends."""
     t = np.arange(-0.1, seconds + 0.1, 1e-3)
     if lively:

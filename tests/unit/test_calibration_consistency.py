@@ -21,9 +21,9 @@ SETTINGS = {"gravity_m_s2": 9.81, "plane_points": 1e9, "min_plane_points": 8, "p
 SCHEDULE = {"plane_thickness_m": [0.1, 0.03], "max_iterations": 10}
 
 
-def estimate(seed: int) -> tuple[Solution, State]:
+def estimate(seed: int, columns: int = 30) -> tuple[Solution, State]:
     """The solution for a drive from a drawing and makers' tolerances that are right, and the truth."""
-    scene = yard(seed)
+    scene = yard(seed, columns=columns)
     truth, rng = scene.truth, np.random.default_rng([seed, 1])
     poses = truth.poses.copy()
     poses[1:, :3, 3] += rng.normal(0, 0.01, (len(poses) - 1, 3))
