@@ -19,6 +19,7 @@ START_NS = 1_776_153_600_000_000_000
 PERIOD_NS = 100_000_000
 GRAVITY = np.array([0, 0, 9.81])
 WXYZ = [3, 0, 1, 2]
+PHASE_NS = {"lidar_front": 3_000_000, "lidar_rear": 45_000_000}
 GROUND = -1.7
 Motion = Callable[[np.ndarray], tuple[np.ndarray, Rotation]]
 
@@ -79,7 +80,7 @@ def standing(t: np.ndarray) -> tuple[np.ndarray, Rotation]:
 class Street:
     """What a drive is made of; `record` writes it down.
 
-    gyro_bias, accel_bias : (3,) SI.  imu_delay_s : how late the IMU's stamps are.
+    gyro_bias, accel_bias : (3,) SI.  imu_delay_s : how late the IMU's stamps are.  lidars : those on board.
     """
 
     boxes: np.ndarray
@@ -90,6 +91,7 @@ class Street:
     gyro_bias: np.ndarray = field(default_factory=lambda: np.array([1e-3, -5e-4, 8e-4]))
     accel_bias: np.ndarray = field(default_factory=lambda: np.array([0.02, -0.01, 0.015]))
     imu_delay_s: float = 0.0
+    lidars: tuple[str, ...] = ("lidar_front",)
     seed: int = 0
 
     def poses(self, t_ns: np.ndarray) -> np.ndarray:
@@ -117,10 +119,10 @@ class Street:
             columns |= {f"gyro_{axis}": gyro[:, i], f"accel_{axis}": accel[:, i]}
         return columns
 
-    def burst(self, number: int, rig_from_lidar: np.ndarray, corrections: dict) -> Burst:
+    def burst(self, lidar: str, number: int, rig_from_lidar: np.ndarray, corrections: dict) -> Burst:
         """One sweep."""
-        rng = np.random.default_rng([self.seed, 2, number])
-        t_ns = START_NS + number * PERIOD_NS + 3_000_000
+        rng = np.random.default_rng([self.seed, 2, number, *lidar.encode()])
+        t_ns = START_NS + number * PERIOD_NS + PHASE_NS[lidar]
         step = PERIOD_NS // self.columns
         column = np.repeat(np.arange(self.columns), 32)
         ring = np.tile(np.arange(32), self.columns)
@@ -138,7 +140,7 @@ class Street:
         )
 
     def record(self, folder: Path) -> Path:
-        """recording.yaml, imu.parquet, sweeps of the front LiDAR, calibration.json and bursts.parquet."""
+        """recording.yaml, imu.parquet, sweeps of the LiDARs, calibration.json and bursts.parquet."""
         folder.mkdir(parents=True, exist_ok=True)
         calibration = true_calibration("2026-04-14-start", 1, "tiny")
         # The boxes are measured without error: nothing is to be corrected.
@@ -147,24 +149,26 @@ class Street:
         lidar = {"model": "XT32", "clock": "synchronised", "deskewed": False}
         imu = {"model": "IMU", "clock": "synchronised"}
         description = {"id": "street", "rig": "r", "day": "2026-04-14", "place": "p", "country": "DE"}
-        description["sensors"] = {"lidar_front": lidar, "imu": imu}
+        description["sensors"] = {**dict.fromkeys(self.lidars, lidar), "imu": imu}
         (folder / "recording.yaml").write_text(yaml.safe_dump(description))
         write_json(folder / "calibration.json", calibration, "calibration")
         write_table(folder / "imu.parquet", self.imu(), "imu")
-        rig_from_lidar = np.eye(4)
-        extrinsic = calibration["extrinsics"]["rig_from_lidar_front"]
-        rig_from_lidar = transform(extrinsic["translation_m"], extrinsic["rotation_wxyz"])
-        (folder / "lidar_front").mkdir()
         rows = []
-        for number in range(round(self.seconds * 10) - 1):
-            corrections = calibration["lidar_corrections"]["lidar_front"]
-            burst = self.burst(number, rig_from_lidar, corrections)
-            write_burst(folder / "lidar_front" / f"{burst.t_ns}.laz", burst)
-            rows.append((number, burst.t_ns, burst.end_ns, len(burst)))
-        number, start, end, points = np.array(rows).T
-        table = {"lidar": ["lidar_front"] * len(rows), "burst": number, "t_start_ns": start, "t_end_ns": end}
-        files = [f"lidar_front/{t_ns}.laz" for t_ns in start]
-        write_table(folder / "bursts.parquet", table | {"points": points, "file": files}, "bursts")
+        for name in self.lidars:
+            extrinsic = calibration["extrinsics"][f"rig_from_{name}"]
+            rig_from_lidar = transform(extrinsic["translation_m"], extrinsic["rotation_wxyz"])
+            corrections = calibration["lidar_corrections"][name]
+            (folder / name).mkdir()
+            for number in range(round(self.seconds * 10) - 1):
+                burst = self.burst(name, number, rig_from_lidar, corrections)
+                file = f"{name}/{burst.t_ns}.laz"
+                write_burst(folder / file, burst)
+                rows.append((name, number, burst.t_ns, burst.end_ns, len(burst), file))
+        names = ("lidar", "burst", "t_start_ns", "t_end_ns", "points", "file")
+        columns = {
+            column: list(values) for column, values in zip(names, zip(*rows, strict=True), strict=True)
+        }
+        write_table(folder / "bursts.parquet", columns, "bursts")
         return folder
 
 

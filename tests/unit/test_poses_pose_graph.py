@@ -27,18 +27,18 @@ from card.poses.take_refined import take_refined
 NEAR = {"loop_min_way_m": 8.0, "loop_coarse_m": 4.0, "loop_spacing_m": 2.0, "loop_radius_m": 3.0}
 
 
-def run(folder: Path, **changes: Any) -> dict[str, Any]:
-    """Both stages; the report of the second."""
+def run(folder: Path, odometry: dict[str, Any] | None = None, **changes: Any) -> dict[str, Any]:
+    """Both stages, the first with changed settings of its own; the report of the second."""
     files = {name: folder / f"{name}.parquet" for name in ("bursts", "odometry", "nodes", "loops")}
     shared = {"recording": folder, "calibration": folder / "calibration.json", "gates": []}
-    odometry = default_settings("odometry")
+    stage_1 = default_settings("odometry") | (odometry or {})
     if not files["odometry"].exists():
         estimate_odometry(
             **shared,
             bursts=files["bursts"],
             odometry=files["odometry"],
             report=folder / "odometry.report.json",
-            settings=odometry,
+            settings=stage_1,
         )
     refine_odometry(
         **shared,
@@ -47,7 +47,7 @@ def run(folder: Path, **changes: Any) -> dict[str, Any]:
         g2o=folder / "graph.g2o",
         report=folder / "pose_graph.report.json",
         settings=default_settings("pose_graph") | changes,
-        odometry_settings=odometry,
+        odometry_settings=stage_1,
     )
     return read_json(folder / "pose_graph.report.json", "report")
 
@@ -135,6 +135,22 @@ def test_without_revisits_the_record_says_so(street: Street, folder: Path, tmp_p
     report = run(tmp_path)
     assert "no loop: drift over the whole drive is not corrected by revisits" in report["notes"]
     path = refined(tmp_path)
+    error = path.translation_m - expected(street, path.t_ns)[:, :3, 3]
+    assert np.linalg.norm(error, axis=1).max() < 0.02
+
+
+@pytest.mark.parametrize("lidars", [["lidar_rear"], ["lidar_front", "lidar_rear"]])
+def test_the_rear_lidar_leads_as_well_alone_or_beside_the_front(tmp_path: Path, lidars: list[str]) -> None:
+    both = ("lidar_front", "lidar_rear")
+    street = Street(houses(length=40), swaying(6.0, turn=0.1), seconds=2.0, columns=120, lidars=both)
+    folder = street.record(tmp_path / "drive")
+    report = run(folder, odometry={"lidars": lidars})
+    table = read_table(folder / "odometry.parquet", "odometry_states")
+    assert set(table["lidar"].to_pylist()) == set(lidars)
+    assert table.num_rows == 19 * len(lidars)
+    assert np.all(table["registered"].to_numpy(zero_copy_only=False)[1:])
+    assert report["counts"]["nodes"] == table.num_rows
+    path = refined(folder)
     error = path.translation_m - expected(street, path.t_ns)[:, :3, 3]
     assert np.linalg.norm(error, axis=1).max() < 0.02
 
