@@ -60,11 +60,9 @@ def _followed(scans: Sequence[Scan], twist: Array, leaf_m: float, planes: PlaneS
     grid.insert(straightened(scans[0], twist, leaf_m / 5))
     for before, scan in pairwise(scans):
         seconds = (scan.end_ns - before.end_ns) * 1e-9
-        last = end
-        for _ in range(2):
-            points = straightened(scan, twist, leaf_m)
-            end = grid.register(points, last @ _moved(twist, seconds), widen=_WIDEN).map_from_scan
-            twist = _twist(inverse(last) @ end, seconds)
+        last, points = end, straightened(scan, twist, leaf_m)
+        end = grid.register(points, last @ _moved(twist, seconds), widen=_WIDEN).map_from_scan
+        twist = _twist(inverse(last) @ end, seconds)
         middles.append(end @ _moved(twist, _half(scan)))
         grid.insert(apply(end, straightened(scan, twist, leaf_m / 5)))
     return middles
