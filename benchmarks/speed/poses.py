@@ -17,7 +17,7 @@ from card.poses.pose_graph import refine_odometry
 from card.recording.ingest.bursts import check_bursts
 from card.recording.paths import list_bursts
 
-DRIVE, SEED, SECONDS = "it_town_revisit", 1, 36.0  # one round of 220 m and the start of a second
+DRIVE, SEED, SECONDS = "it_town_revisit", 1, 60.0  # two rounds of 220 m
 LIDAR = "lidar_front"
 #: The drive of ten minutes has a tenth of the columns: what grows with it are the nodes and the map.
 LONG_S, LONG_COLUMNS = 600.0, 200
