@@ -53,6 +53,7 @@ def basic(**more: tuple[str, Any]) -> dict[str, tuple[str, Any]]:
     ("name", "kind", "values"),
     [
         ("timestamp", "f8", STAMP_NS / 1e9 + np.array([0.0, 0.05, 0.0999])),
+        ("timestamp", "f8", STAMP_NS + np.array([0.0, 5e7, 9.99e7])),
         ("time", "f4", [0.0, 0.05, 0.0999]),
         ("t", "u4", [0, 50_000_000, 99_900_000]),
         ("offset_time", "u4", [0, 50_000_000, 99_900_000]),

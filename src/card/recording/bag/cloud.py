@@ -17,16 +17,18 @@ _KINDS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"
 _TIME = ("timestamp", "time_stamp", "offset_time", "time", "t")
 _RING = ("ring", "channel", "line")
 _INTENSITY = ("reflectivity", "intensity")
-# Seconds: more than this since the message's stamp can only be time since 1970.
-_ABSOLUTE_FROM_S = 1e6
+# More than so many seconds since the message's stamp can only be time since 1970, more than so many still
+# only nanoseconds.
+_ABSOLUTE_FROM_S, _NANOSECONDS_FROM = 1e6, 1e15
 
 
 def points_of_cloud(cloud: Any, where: object) -> Points:
     """A cloud -> its points on the message's clock, in order of time.
 
-    Integer times are nanoseconds since the message's stamp; floating ones are seconds since the
-    stamp, or since 1970 where they are that large. A cloud that says it is not dense may hold points
-    that are not finite, which are no returns and left out; so are points at the origin.
+    Integer times are nanoseconds since the message's stamp; floating ones are seconds since the stamp,
+    or since 1970 where they are that large, and nanoseconds where they are larger still. A cloud that
+    says it is not dense may hold points that are not finite, which are no returns and left out; so are
+    points at the origin.
 
     Raises CardError when position, per-point time, ring or intensity are missing or out of range.
     """
@@ -91,6 +93,8 @@ def _time_ns(values: npt.NDArray[Any], stamp_ns: int) -> npt.NDArray[np.int64]:
     seconds = values.astype(np.float64)
     if np.max(seconds, initial=0.0) < _ABSOLUTE_FROM_S:
         return stamp_ns + np.rint(seconds * 1e9).astype(np.int64)
+    if np.min(seconds) >= _NANOSECONDS_FROM:
+        return np.rint(seconds).astype(np.int64)
     # Whole seconds apart: their product with 1e9 does not fit a float64.
     whole = np.floor(seconds)
     return whole.astype(np.int64) * 1_000_000_000 + np.rint((seconds - whole) * 1e9).astype(np.int64)
