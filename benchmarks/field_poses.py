@@ -110,9 +110,11 @@ def main() -> None:
     for drive, listed in found.items():
         for figure in dict.fromkeys(figure for figures in listed for figure in figures):
             values = np.array([figures[figure] for figures in listed if figure in figures])
-            # The bad side: the share of biases within their sigmas should be high, all else low.
-            bad = np.nanpercentile(values, 5 if figure == "biases_within_pct" else 95)
-            print(f"{drive:20} {figure:24} {np.nanmedian(values):10.4g} {bad:10.4g}  of {len(values)}")
+            values = values[np.isfinite(values)]
+            if len(values):
+                # The bad side: the share of biases within their sigmas should be high, all else low.
+                bad = np.percentile(values, 5 if figure == "biases_within_pct" else 95)
+                print(f"{drive:20} {figure:24} {np.median(values):10.4g} {bad:10.4g}  of {len(values)}")
 
 
 def _trajectory(path: Path) -> Trajectory:
