@@ -54,7 +54,7 @@ def calibrate_rear_and_imu(
     rear_and_imu, report : the files to write, of schemas ``rear_and_imu_calibration`` and ``report``.
     settings : those of the stage calibration.  odometry_settings : what the IMU's errors are like, and how
         the first trajectory is made.
-    threads : that read sweeps; the bytes do not depend on it.
+    threads : that read sweeps; the bytes do not depend on it, but on how many the linear algebra uses.
 
     Raises
     ------
