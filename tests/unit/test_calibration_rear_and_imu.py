@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 def run(folder: Path, **changed: Any) -> dict[str, Any]:
     """The document that the stage writes for the drive in a folder."""
     settings = default_settings("calibration")
-    settings["rear_and_imu"] |= {"solved_share": 1, **changed}
+    settings["rear_and_imu"] |= changed
     calibrate_rear_and_imu(
         drive=folder / "drive",
         front_lidar=folder / "front_lidar.json",

@@ -81,7 +81,9 @@ def calibrate_rear_and_imu(
     alone = rear_alone(rays, state, state.trajectory(imu, gravity), odometry_settings, own["start_sweeps"])
     priors = _priors(state, drawn, boards["sigmas"], own, ImuNoise.from_settings(odometry_settings))
     begun = replace(state, mounted=np.stack([mounted[FRONT], alone.rig_from_lidar]))
-    solution = solve(begun, rays.thinned(own["solved_share"]), imu, priors, {**own, "gravity_m_s2": gravity})
+    solution = solve(
+        begun, rays.thinned(own["estimate_returns"]), imu, priors, {**own, "gravity_m_s2": gravity}
+    )
     document = rear_and_imu_document(solution, priors, alone, rays, imu, own)
     _check_drawing(document, own["max_drawing_sigmas"], drawing)
 

@@ -44,8 +44,9 @@ class Rays:
             result[mine] = correct_points(self.points[mine], self.ring[mine], corrections[name])
         return result
 
-    def thinned(self, step: int) -> "Rays":
-        """One return of so many; the sweeps stay."""
+    def thinned(self, returns: int) -> "Rays":
+        """At most about so many returns of a sweep, evenly taken."""
+        step = max(1, round(len(self.ring) / (len(self.sweep_lidar) * returns)))
         return replace(
             self,
             points=self.points[::step],
