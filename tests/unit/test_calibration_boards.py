@@ -83,6 +83,21 @@ def test_the_sector_detector_is_the_more_exact_one(monkeypatch: pytest.MonkeyPat
     assert rms["sectors"] < 0.04
 
 
+def test_small_squares_are_not_drawn_apart() -> None:
+    """A detector that shifts outer corners outwards makes the board larger, and the focal length longer."""
+    small = [i for i in range(COUNT) if _square_px(truth("camera_left", i)) < SETTINGS["sector_square_px"]]
+    assert len(small) >= 3
+    expected = np.array([truth("camera_left", i) for i in small])
+    errors = np.array([corners_in(picture("camera_left", COUNT, i)) for i in small]) - expected
+    from_middle = expected - expected.mean(axis=1, keepdims=True)
+    scale = np.sum(errors * from_middle) / np.sum(from_middle**2)
+    assert abs(scale) < 2e-4
+
+
+def _square_px(corners: np.ndarray) -> float:
+    return float(np.linalg.norm(np.diff(corners.reshape(ROWS, COLUMNS, 2), axis=1), axis=2).min())
+
+
 def test_a_board_upside_down_starts_at_the_same_corner() -> None:
     pixels = picture("camera_left", COUNT, 1)
     upright = corners_in(pixels)

@@ -30,7 +30,8 @@ def find_chessboard(
     if corners is None:
         return None, f"no board with {columns} x {rows} inner corners"
     lattice = _refined(image, corners, columns, rows, settings["corner_window_squares"])
-    lattice = _by_sectors(image, lattice)
+    if _shortest_step(lattice) >= settings["sector_square_px"]:
+        lattice = _by_sectors(image, lattice)
     lattice = _first_square_dark(image, lattice)
     contrast, width_px = edge_profile(image, lattice)
     if contrast < settings["min_contrast"]:
@@ -72,7 +73,8 @@ def _by_sectors(image: Image, lattice: Array) -> Array:
     """The same corners by the sector-based detector, run on the board alone; unchanged where it disagrees.
 
     A. Duda and U. Frese, "Accurate Detection and Localization of Checkerboard Corners for Calibration", BMVC
-    2018. It is the more exact one, and the slower one by far on a whole image.
+    2018. It is the more exact one where squares are large. Where they are small, what lies beyond the pattern
+    draws its outer corners outwards by hundredths of a pixel: that is a larger board, a longer focal length.
     """
     rows, columns = lattice.shape[:2]
     rim = 2.5 * max(np.linalg.norm(np.diff(lattice, axis=axis), axis=-1).max() for axis in (0, 1))
