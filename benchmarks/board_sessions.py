@@ -40,6 +40,8 @@ SIZE_PX = (2248, 2252)
 NOISE_PX = 0.05
 #: As far off as the maker lets a range be.
 BIAS_M = 0.01
+#: Boards and firings a revolution of the sessions that consistency is judged over.
+SMALL = (24, 200)
 AIMS = {"stereo_deg": 0.005, "stereo_mm": 0.5, "camera_lidar_deg": 0.03, "camera_lidar_mm": 3.0}
 BOARD = Board(*board.INNER_CORNERS, board.SQUARE_M, np.array(board.SIZE_M), np.array(board.PLATE_CORNER_M))
 
@@ -193,7 +195,7 @@ def main() -> None:
         rows.append(_row(figure, float(np.median(values)), unit, aim, "lower"))
         rows.append(_row(f"{figure}_p95", float(np.percentile(values, 95)), unit, None, "lower"))
     if options.consistency:
-        found = normalised_errors(options.consistency, 40, 400)
+        found = normalised_errors(options.consistency, *SMALL)
         for name, (mean, low, high) in mean_normalised(found).items():
             print(f"{name}: mean normalised error squared {mean:.3f}, wanted {low:.3f} to {high:.3f}")
         rows.append(consistency_row(found))

@@ -22,7 +22,7 @@ def test_covariances_neither_boast_nor_hide() -> None:
 
 @pytest.mark.slow
 def test_covariances_neither_boast_nor_hide_over_a_hundred_seeds() -> None:
-    check_consistent(100, 40, 400)
+    check_consistent(100, 24, 200)
 
 
 def check_exact(seeds: int, boards: int, columns: int) -> None:
