@@ -27,7 +27,7 @@ CONTACTS = slice(1, None, 2)
 def estimated(scene: Scene) -> tuple[list[Alignment], Wheels]:
     observed = scene.observed()
     boards = [
-        np.stack([board_pose(scene.sensors, seen.corners, pixels)[0] for pixels in seen.pixels])
+        np.stack([board_pose(scene.sensors, seen.corners, pixels, 1.0)[0] for pixels in seen.pixels])
         for seen in observed
     ]
     alignments, sigmas = align_surveys(scene.sensors, observed, boards, (NOISE_PX, NOISE_M))
@@ -131,7 +131,7 @@ def _by_step(alignment: Alignment, points: np.ndarray, axis: int) -> np.ndarray:
 def test_the_estimate_moves_with_the_cameras_as_its_derivatives_say() -> None:
     scene = surveyed_day(4)
     (seen, *_), sensors = scene.observed(), scene.sensors
-    boards = np.stack([board_pose(sensors, seen.corners, pixels)[0] for pixels in seen.pixels])
+    boards = np.stack([board_pose(sensors, seen.corners, pixels, 1.0)[0] for pixels in seen.pixels])
     found = align_station(sensors, seen, boards, NOISE_PX, NOISE_M)
     sigma = np.sqrt(np.diag(sensors.covariance))
     for parameter in (0, 2, 4, 12, 19, 22):
@@ -299,6 +299,16 @@ def test_images_of_other_cameras_are_named(tmp_path: Path) -> None:
     scene.pixels[1, 1, 1, :, 0] += np.linspace(0, 12, len(board.corners_m()))
     told = refused(scene, tmp_path)
     assert told.startswith("survey-2/pose-2: the images of the board do not fit the cameras")
+
+
+def test_wrong_corners_are_left_out_and_told(tmp_path: Path) -> None:
+    scene = surveyed_day(0)
+    scene.pixels[0, 2, 0, 7] += [8.0, -9.0]
+    scene.pixels[0, 2, 1, 31] += [0.0, 4.0]
+    document = run(scene, tmp_path)
+    assert contacts_mm(document, scene).max() < 4
+    assert document["quality"]["reprojection_rms_px"] < 0.2
+    assert notes(tmp_path) == ["survey-1/pose-3: 2 corners are wrong and not used"]
 
 
 def test_same_input_same_bytes(tmp_path: Path) -> None:

@@ -9,15 +9,14 @@ from numpy.typing import NDArray
 
 from card.artifacts import Figure, read_json, read_yaml, write_json, write_report
 from card.calibration.board import Board
-from card.calibration.board_pose import board_pose
-from card.calibration.board_views import BoardViews, read_board_views
+from card.calibration.board_views import read_board_views
 from card.calibration.front_sensors import FrontSensors
 from card.calibration.rig_wheels_document import rig_wheels_document
 from card.calibration.survey_alignment import Alignment, Observed, align_station
+from card.calibration.survey_boards import check_still, observed_boards
 from card.calibration.survey_checks import with_agreeing_wheels, with_sound_marks
-from card.calibration.survey_points import POINTS, Survey, read_surveys
+from card.calibration.survey_points import POINTS, read_surveys
 from card.calibration.wheel_mean import mean_wheels
-from card.errors import CardError
 
 Array = NDArray[np.float64]
 
@@ -66,8 +65,12 @@ def calibrate_rig_wheels(
     surveys, mended = with_agreeing_wheels(surveys, chosen)
     notes += mended
     views = read_board_views(boards, target)
-    observed = [_observed(found, target.corners_m, marks, views) for found in surveys]
-    started = [_boards(found, seen, sensors, chosen) for found, seen in zip(surveys, observed, strict=True)]
+    observed, started = [], []
+    for found in surveys:
+        seen, poses, dropped = observed_boards(found, target.corners_m, marks, views, sensors, chosen)
+        observed.append(seen)
+        started.append(poses)
+        notes += dropped
     sigmas = document["quality"]["corner_sigma_px"], chosen["survey_sigma_m"]
     for found, seen, poses in zip(surveys, observed, started, strict=True):
         check_still(found, seen, poses, sensors, sigmas, chosen)
@@ -136,64 +139,5 @@ def align_surveys(
     return alignments, sigmas
 
 
-def check_still(
-    survey: Survey,
-    observed: Observed,
-    boards: Array,
-    sensors: FrontSensors,
-    sigmas: tuple[float, float],
-    settings: Mapping[str, Any],
-) -> None:
-    """Survey and images must have the board in the same places.
-
-    Raises
-    ------
-    CardError
-        Naming the pose without which they would.
-    """
-    limit = settings["max_survey_rms_m"]
-    rms = align_station(sensors, observed, boards, *sigmas).mark_rms_m
-    if rms <= limit:
-        return
-    without = [
-        align_station(sensors, observed.without(pose), np.delete(boards, pose, axis=0), *sigmas).mark_rms_m
-        for pose in range(len(boards))
-    ]
-    best = int(np.argmin(without))
-    named = survey.poses[best] if without[best] <= limit else "more than one pose"
-    raise CardError(
-        f"the board was not where the images show it in {named}",
-        where=survey.name,
-        found=f"points {1e3 * rms:.1f} mm off, {1e3 * without[best]:.1f} mm without {survey.poses[best]}",
-        wanted=f"at most {1e3 * limit:g} mm; was it moved, or its points named in another order?",
-    )
-
-
-def _observed(survey: Survey, corners: Array, marks: Array, views: BoardViews) -> Observed:
-    names = [f"{survey.name}/{pose}" for pose in survey.poses]
-    for name in names:
-        if name not in views.names:
-            raise CardError(
-                "no stereo pair shows the board", where=name, wanted="one for each pose of the survey"
-            )
-    pixels = views.pixels[:, [views.names.index(name) for name in names]]
-    return Observed(corners, marks, np.swapaxes(pixels, 0, 1), survey.marks)
-
-
-def _boards(survey: Survey, observed: Observed, sensors: FrontSensors, settings: Mapping[str, Any]) -> Array:
-    poses = []
-    for pose, pixels in zip(survey.poses, observed.pixels, strict=True):
-        found, rms = board_pose(sensors, observed.corners, pixels)
-        if rms > settings["max_view_rms_px"]:
-            raise CardError(
-                "the images of the board do not fit the cameras",
-                where=f"{survey.name}/{pose}",
-                found=f"{rms:.2f} px",
-                wanted=f"at most {settings['max_view_rms_px']:g} px",
-            )
-        poses.append(found)
-    return np.stack(poses)
-
-
 def _pooled(residuals: Sequence[Array], freedom: Sequence[float]) -> float:
-    return float(np.sqrt(sum(np.sum(np.square(values)) for values in residuals) / sum(freedom)))
+    return float(np.sqrt(sum(float(np.sum(np.square(values))) for values in residuals) / sum(freedom)))

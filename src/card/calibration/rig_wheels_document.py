@@ -53,7 +53,7 @@ def rig_wheels_document(
         "verdict": verdict(
             Limit("spread_mm", quality["spread_mm"], settings["max_spread_mm"]),
             Limit("contact_sigma_mm", quality["contact_sigma_mm"], settings["max_contact_sigma_mm"]),
-            Limit("reprojection_rms_px", quality["reprojection_rms_px"], settings["max_view_rms_px"]),
+            Limit("reprojection_rms_px", quality["reprojection_rms_px"], settings["max_reprojection_rms_px"]),
         ),
     }
 

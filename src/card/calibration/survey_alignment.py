@@ -28,7 +28,7 @@ class Observed:
     """What is known of a board in one survey's poses.
 
     corners : (N, 3) and marks (M, 3) in the board frame, metres.
-    pixels : (P, 2, N, 2) of the corners in the left and the right image.
+    pixels : (P, 2, N, 2) of the corners in the left and the right image; NaN where one is not used.
     surveyed : (P, M, 3) of the marks in the frame of the station, metres; NaN where not measured.
     """
 
