@@ -17,11 +17,13 @@ min_version("9.27")
 configfile: "config/config.yaml"
 
 
+include: "workflow/rules/days.smk"
 include: "workflow/rules/common.smk"
 include: "workflow/rules/sequences.smk"
 include: "workflow/rules/repositories.smk"
 include: "workflow/rules/simulation.smk"
 include: "workflow/rules/ingest.smk"
+include: "workflow/rules/sessions.smk"
 include: "workflow/rules/calibration.smk"
 include: "workflow/rules/poses.smk"
 include: "workflow/rules/ground_truth.smk"

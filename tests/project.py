@@ -81,7 +81,7 @@ def copy_repository(folder: Path, scale: str) -> Project:
     """Copy what git tracks or would track, and set the scale.
 
     A tiny LiDAR, with 90 columns, is too thin to register everywhere: all but one sequence are delivered with
-    a trajectory.
+    a trajectory. In tiny images a board has no corners to speak of: bundles are delivered.
     """
     listed = subprocess.run(
         ["git", "ls-files", "--cached", "--others", "--exclude-standard", "-z"],
@@ -98,6 +98,7 @@ def copy_repository(folder: Path, scale: str) -> Project:
     text = config.read_text().replace("scale: demo", f"scale: {scale}")
     if scale == "tiny":
         text = text.replace("  overrides:\n", f"  overrides:\n{NO_FACE_AT_TINY}")
+        text = text.replace("\ncalibration:\n", "\ncalibration:\n  mode: import\n")
         text += f"\nposes: {{mode: import, modes: {{{ESTIMATED}: estimate}}}}\n"
     config.write_text(text)
     return Project(folder)

@@ -21,7 +21,8 @@ def refused(project: Project, *arguments: str) -> str:
     [
         ("\tDE\t", "\tFR\t", "country without a licence (found FR"),
         ("de_rural_potholes\t", "de_town_bumps\t", "duplicate id (found de_town_bumps"),
-        ("2026-04-14-start", "2026-04-13-start", "unknown session (found 2026-04-13-start"),
+        ("\t2026-04-14\t", "\t2026-04-13-start\t", "unknown session (found 2026-04-13-start"),
+        ("\t2026-04-14\t", "\t2026-04-13\t", "de_town_bumps: no calibration session of that day"),
         (
             "de_town_bumps\trecordings/de_town_bumps",
             "my_drive\trecordings/my_drive",
@@ -33,6 +34,14 @@ def refused(project: Project, *arguments: str) -> str:
 def test_a_wrong_sheet_is_refused(fresh: Project, old: str, new: str, message: str) -> None:
     with fresh.changed(SHEET, old, new):
         assert message in refused(fresh)
+
+
+def test_a_day_without_a_survey_cannot_be_estimated(fresh: Project) -> None:
+    with (
+        fresh.changed("config/config.yaml", "  mode: import\n", "  mode: estimate\n"),
+        fresh.changed("config/config.yaml", '["2026-04-14", "2026-05-19"]', '["2026-05-19"]'),
+    ):
+        assert "de_town_bumps: no survey of the wheels on that day (found 2026-04-14" in refused(fresh)
 
 
 def test_an_unknown_setting_is_refused(fresh: Project) -> None:

@@ -111,6 +111,37 @@ def test_another_mode_reruns_the_poses_of_its_sequence_only(built: Project) -> N
     assert not {("odometry", ESTIMATED), ("pose_graph", ESTIMATED), ("poses", TOWN)} & plan
 
 
+def test_a_changed_session_reruns_only_the_sequence_that_takes_it(built: Project) -> None:
+    german = [id for id in DRIVES if id.startswith("de_")]
+    session = "recordings/sessions/2026-04-14-start/calibration.json"
+    with built.changed(session, '"views": 3', '"views": 4'):
+        plan = built.plan()
+    # The day's drift is told with each of its sequences.
+    drift = {("calibration_drift", "")} | {("package", id) for id in german}
+    assert drift | chain(TOWN, "calibration", "poses", "ground_truth", "wheels") <= plan
+    assert {id for rule, id in plan - drift if id in DRIVES} == {TOWN}
+
+
+def test_estimating_one_sequence_s_calibration_uses_all_sessions_of_its_day(built: Project) -> None:
+    modes = f"  mode: import\n  modes: {{{ESTIMATED}: estimate}}\n  cameras"
+    with built.changed("config/config.yaml", "  mode: import\n  cameras", modes):
+        plan = built.plan()
+    sessions = [f"2026-05-19-{part}" for part in ("start", "mid", "end")]
+    steps = ("boards", "cameras", "front_lidar", "rear_and_imu", "session_calibration")
+    of_sessions = {(step, session) for step in steps for session in sessions}
+    assert of_sessions | {("boards", "2026-05-19-leica"), ("rig_wheels", "2026-05-19")} <= plan
+    assert {("calibration", ESTIMATED), ("calibration_drift", ""), ("package", ESTIMATED)} <= plan
+    assert not {entry for entry in plan if entry[1].startswith(("2026-04-14", "de_", "it_town"))}
+
+
+def test_a_session_that_the_sheet_names_is_taken_instead_of_the_nearest(built: Project) -> None:
+    line = sheet_line(built, TOWN)
+    with built.changed("config/sequences.tsv", line, line.replace("\t2026-04-14\t", "\t2026-04-14-start\t")):
+        assert built.plan() == set()
+    with built.changed("config/sequences.tsv", line, line.replace("\t2026-04-14\t", "\t2026-04-14-end\t")):
+        assert chain(TOWN, "calibration", "poses", "ground_truth", "package") <= built.plan()
+
+
 def test_an_override_reruns_only_the_sequence_it_is_signed_for(built: Project) -> None:
     with built.changed("config/config.yaml", ", it_zero_shot]\n      signed_by", "]\n      signed_by"):
         assert built.plan() == chain("it_zero_shot", "privacy", "package") | tree(ITALY)
@@ -136,7 +167,7 @@ def test_a_subset_plans_only_its_sequences_and_leaves_the_release_alone(built: P
         chain(TOWN, "calibration", *STAGES, "simulate_drive")
         | split_tree(GERMANY)
         | {("simulate_session", f"2026-04-14-{part}") for part in ("start", "mid", "end")}
-        | {("simulate_survey", "2026-04-14")}
+        | {("simulate_survey", "2026-04-14"), ("simulate_drawing", "drawing"), ("calibration_drift", "")}
     )
 
 

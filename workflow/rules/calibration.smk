@@ -1,4 +1,4 @@
-# Needs: the calibration session that the sheet names.
+# Needs: the bundle of the sequence's session, delivered or estimated, and the mask in the session's raw folder.
 # Makes: results/{id}/calibration.json and ego_mask.png.
 
 
@@ -13,11 +13,11 @@ rule calibration:
         "logs/{id}/calibration.log",
     priority: 1
     params:
-        cfg=cfg("calibration"),
+        cfg=calibration_cfg,
         code=code("calibration"),
-        session=subpath(input.bundle, parent=True),
+        session=raw_session,
         raw=lambda wildcards: fingerprint(
-            Path(session_bundle(wildcards)).with_name("ego_mask.png"),
+            Path(raw_session(wildcards), "ego_mask.png"),
             Path("results", wildcards.id, "fingerprints", "ego_mask.json"),
         ),
     script:

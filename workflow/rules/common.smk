@@ -1,7 +1,7 @@
 # The checked configuration, the sequences to build, settings and code of a stage, what a run says.
 import os
 import sys
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -18,6 +18,7 @@ from card.packaging.takedowns import read_takedowns, whole_sequences
 from card.packaging.versions import latest_records
 from card.recording.description import check_identity
 from card.recording.fingerprint import fingerprint
+from card.recording.nearest_session import nearest_session, start_of
 from card.recording.sheet import read_sequences
 from card.recording.space import require_space
 from card.splits.history import check_kept
@@ -57,8 +58,10 @@ def load_plan():
         and row.id not in withdrawn
         and (not SUBSET or row.id in SUBSET)
     }
-    for row in chosen.values():
+    for name, row in chosen.items():
         check_raw_input(row)
+        chosen[name] = with_session(row)
+        check_session(chosen[name])
     check_kept(Path(SETTINGS["splits_ledger"]))
     ledger = [
         dict(zip(COLUMNS, line.cells()))
@@ -96,18 +99,6 @@ def check_raw_input(row):
         )
     if Path(row.recording, "recording.yaml").is_file():
         check_identity(Path(row.recording), row)
-    if row.session and row.session not in simulated["sessions"]:
-        folder = Path(RAW, "sessions")
-        if not (folder / row.session).is_dir():
-            there = (
-                sorted(path.name for path in folder.glob("*")) + simulated["sessions"]
-            )
-            raise CardError(
-                "unknown session",
-                where=row.id,
-                found=row.session,
-                wanted=f"one of {there}",
-            )
 
 
 try:
@@ -123,7 +114,7 @@ except CardError as error:
 
 wildcard_constraints:
     id="[a-z0-9_-]+",
-    session="[0-9]{4}-[0-9]{2}-[0-9]{2}-(start|mid|end)",
+    session="[0-9]{4}-[0-9]{2}-[0-9]{2}-(start|mid|end|leica)",
     day="[0-9]{4}-[0-9]{2}-[0-9]{2}",
 
 
@@ -134,17 +125,20 @@ def code(stage):
 
 def cfg(stage, *names):
     """Settings (all, or the named ones) and gates of a stage, as one dict of builtins."""
-    scale = SETTINGS["scale"]
     settings = {name: SETTINGS[stage][name] for name in names or SETTINGS[stage]}
-    gates = [
+    return {"settings": settings, "gates": gates_of(stage)}
+
+
+def gates_of(stage):
+    """Gates of a stage at the configured scale."""
+    return [
         {
             **{name: gate[name] for name in ("figure", "unit", "better")},
-            "threshold": gate["threshold"][scale],
+            "threshold": gate["threshold"][SETTINGS["scale"]],
         }
         for gate in GATES
         if gate["stage"] == stage
     ]
-    return {"settings": settings, "gates": gates}
 
 
 def check_space():

@@ -89,8 +89,13 @@ def simulated_days():
         name for name in SIMULATED["sessions"] if name.rsplit("-", 1)[0] in days
     ]
     surveys = [name for name in SIMULATED["surveys"] if name in days]
-    return expand(rules.simulate_session.output.bundle, simulated=sessions) + expand(
-        rules.simulate_survey.output.board, day=surveys
+    drawing = expand(
+        rules.simulate_drawing.output.drawing, drawing=["drawing"] if sessions else []
+    )
+    return (
+        drawing
+        + expand(rules.simulate_session.output.bundle, simulated=sessions)
+        + expand(rules.simulate_survey.output.board, day=surveys)
     )
 
 
@@ -158,10 +163,6 @@ def privacy_sight(wildcards):
     }
 
 
-def session_bundle(wildcards):
-    return f"{RAW}/sessions/{SEQUENCES[wildcards.id].session}/calibration.json"
-
-
 def ledger_rows(names):
     return [line for line in LEDGER if line["sequence"] in names]
 
@@ -191,6 +192,8 @@ def package_inputs(wildcards):
         if stage not in ("splits", "irregularities", "privacy_audit")
     ]
     found = {f"{stage}_report": getattr(rules, stage).output.report for stage in stages}
+    if has_drift(SEQUENCES[wildcards.id]):
+        found["calibration_drift_report"] = drift_report(SEQUENCES[wildcards.id])
     for name, (stage, output) in PACKED.items():
         if stage in stages:
             found[name] = getattr(getattr(rules, stage).output, output)

@@ -43,6 +43,7 @@ rule simulate_drawing:
 
 rule simulate_session:
     output:
+        board=f"{RAW}/sessions/{{simulated}}/board.yaml",
         bundle=f"{RAW}/sessions/{{simulated}}/calibration.json",
         ego_mask=f"{RAW}/sessions/{{simulated}}/ego_mask.png",
     log:

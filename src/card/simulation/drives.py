@@ -3,6 +3,8 @@
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from card.errors import CardError
 from card.simulation.road import CrossSection
 
@@ -68,6 +70,12 @@ class Drive:
     def day(self) -> str:
         """Drive day, ISO date."""
         return self.session[:10]
+
+    @property
+    def start_ns(self) -> int:
+        """When it starts, ns since 1970."""
+        midnight = int(np.datetime64(self.day, "ns").astype(np.int64))
+        return midnight + round(self.starts * 3600) * 1_000_000_000
 
 
 DRIVES = {

@@ -69,8 +69,7 @@ def build_world(name: str, scale: str, seed: int) -> World:
 
 def world_of(name: str, drive: Drive, size: Scale, seed: int) -> World:
     """The world of any drive, at a scale that may have a duration of its own."""
-    day_ns = int(np.datetime64(drive.day, "ns").astype(np.int64))
-    start_ns = day_ns + round(drive.starts * 3600) * 1_000_000_000
+    start_ns = drive.start_ns
     size = size.cut(drive.lasts_s)
     begin = size.camera_start_s
     where = course([(t + begin, v) for t, v in drive.speeds], 0.0, size.duration_s)
