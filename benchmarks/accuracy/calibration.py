@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from card.artifacts import read_json
-from card.geometry import from_json, inverse
+from card.geometry import apply, from_json, inverse
 
 WHEELS = ("fl", "fr", "rl", "rr")
 #: Figure prefix: the two frames whose relative pose is judged, and the aims in deg and mm.
@@ -24,14 +24,18 @@ WHEEL_CONTACT_AIM_MM = 2.0
 
 
 def rows(work: Path, truth: Path, sequences: Sequence[str]) -> list[dict[str, Any]]:
-    """Medians over the sessions of the sequences: relative poses in deg and mm, wheel contacts in mm.
+    """Medians over sessions, those estimated and those the sequences take: relative poses, wheel contacts.
 
-    work : folder with ``results/<id>/``; truth : folder with ``sessions/<session>/calibration.json``.
+    Contacts are those of the surveys, where there are any: a bundle's come to it by way of the front LiDAR.
+
+    work : folder with ``results/<id>/`` and ``results/sessions/``; truth : with
+    ``sessions/<session>/calibration.json``.
     """
+    files = sorted((work / "results" / "sessions").glob("*/calibration.json"))
+    files += [work / "results" / sequence / "calibration.json" for sequence in sequences]
     errors: dict[str, list[float]] = defaultdict(list)
     sessions: set[str] = set()
-    for sequence in sequences:
-        file = work / "results" / sequence / "calibration.json"
+    for file in files:
         found = read_json(file, "calibration") if file.is_file() else None
         if found is None or found["session"]["id"] in sessions:
             continue
@@ -41,6 +45,8 @@ def rows(work: Path, truth: Path, sequences: Sequence[str]) -> list[dict[str, An
         sessions.add(found["session"]["id"])
         for figure, value in bundle_errors(found, read_json(true, "calibration")).items():
             errors[figure].append(value)
+    surveyed = _survey_errors(work, truth)
+    errors["wheel_contact_mm"] = surveyed or errors["wheel_contact_mm"]
     aims = {f"{name}_deg": deg for name, (_, _, deg, _) in PAIRS.items()}
     aims |= {f"{name}_mm": mm for name, (_, _, _, mm) in PAIRS.items()}
     aims["imu_deg"], aims["imu_mm"] = IMU_AIMS
@@ -59,18 +65,17 @@ def rows(work: Path, truth: Path, sequences: Sequence[str]) -> list[dict[str, An
 
 
 def bundle_errors(found: Mapping[str, Any], true: Mapping[str, Any]) -> dict[str, float]:
-    """Errors of one bundle by figure: angles in deg, distances in mm; contacts as the worst wheel's."""
+    """Errors of one bundle by figure: angles in deg, distances in mm.
+
+    Contacts are compared in the left camera, as the worst wheel's: where the IMU is, is a figure of its own.
+    """
     errors = {}
     for name, (one, other, _, _) in PAIRS.items():
         error = inverse(_between(true, one, other)) @ _between(found, one, other)
         errors[f"{name}_deg"] = angle_deg(error[:3, :3])
         errors[f"{name}_mm"] = 1e3 * float(np.linalg.norm(error[:3, 3]))
     errors |= imu_errors(found, true)
-    contacts = [
-        np.subtract(found["wheels"][wheel]["contact_m"], true["wheels"][wheel]["contact_m"])
-        for wheel in WHEELS
-    ]
-    errors["wheel_contact_mm"] = 1e3 * float(np.linalg.norm(contacts, axis=1).max())
+    errors["wheel_contact_mm"] = _worst_mm(_contacts(found), _contacts(true))
     return errors
 
 
@@ -79,6 +84,28 @@ def imu_errors(found: Mapping[str, Any], true: Mapping[str, Any]) -> dict[str, f
     ours, theirs = (from_json(bundle["extrinsics"]["rig_from_lidar_front"]) for bundle in (found, true))
     distance = float(np.linalg.norm(ours[:3, 3] - theirs[:3, 3]))
     return {"imu_deg": angle_deg(ours[:3, :3] @ theirs[:3, :3].T), "imu_mm": 1e3 * distance}
+
+
+def _survey_errors(work: Path, truth: Path) -> list[float]:
+    """Worst contact of each survey, mm."""
+    errors = []
+    for file in sorted((work / "results" / "sessions").glob("*-leica/rig_wheels.json")):
+        true = truth / "sessions" / file.parent.name / "calibration.json"
+        if true.is_file():
+            wheels = read_json(file, "rig_wheels_calibration")["camera_left"]["wheels"]
+            found = np.array([wheels[wheel]["contact_m"] for wheel in WHEELS])
+            errors.append(_worst_mm(found, _contacts(read_json(true, "calibration"))))
+    return errors
+
+
+def _worst_mm(found: NDArray[np.float64], true: NDArray[np.float64]) -> float:
+    return 1e3 * float(np.linalg.norm(found - true, axis=1).max())
+
+
+def _contacts(bundle: Mapping[str, Any]) -> NDArray[np.float64]:
+    """Wheel contacts (4, 3) in the left camera, metres."""
+    contacts = np.array([bundle["wheels"][wheel]["contact_m"] for wheel in WHEELS])
+    return apply(inverse(from_json(bundle["extrinsics"]["rig_from_camera_left"])), contacts)
 
 
 def angle_deg(rotation: NDArray[np.float64]) -> float:

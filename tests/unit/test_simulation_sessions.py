@@ -98,7 +98,7 @@ def test_board_returns_lie_on_the_board_once_corrected(demo: tuple[Path, Path]) 
             x, y, z = apply(board_from_lidar, points).T
             inside = np.abs(np.stack([x, y], axis=1) - (0.385, 0.22)) < (0.5, 0.34)
             on_board = inside.all(axis=1) & (np.abs(z) < 0.06)
-            assert on_board.sum() > 20
+            assert on_board.sum() > 10  # a quarter of a plate at six metres, by 200 columns
             errors.extend((z[on_board] / ray_cosine[on_board]).tolist())
     # 5 mm of noise and a step of 4 mm: sqrt(25 + 16 / 12) = 5.1 mm along the ray.
     assert np.std(corrected) == pytest.approx(0.0051, rel=0.1)
