@@ -3,7 +3,8 @@
     python benchmarks/field_wheels.py de_town_bumps-1-45s de_gravel_offroad-1-45s
 
 takes the named drives (drive, seed and seconds) from front LiDAR and IMU to the excitation, and prints the
-figures of benchmarks/accuracy/wheels.py a drive and over all of them.
+figures of benchmarks/accuracy/wheels.py a drive and over all of them. Poses and static voxels that a run left
+under --work are taken as they are.
 """
 
 import argparse
@@ -16,7 +17,7 @@ from field_ground_truth import inputs_of
 from ground_truth_figures import Inputs
 from speed.poses import batch, odometry
 from wheel_errors import WheelErrors, wheel_errors
-from wheel_inputs import excite_with
+from wheel_inputs import excite_only, static_of
 
 from card.artifacts import default_settings
 from card.poses.take_refined import take_refined
@@ -27,6 +28,8 @@ WORK = OUT.parent / "field_wheels"
 def estimated(field: Field, inputs: Inputs, folder: Path) -> Path:
     """The trajectory that the poses stage estimates of a drive, in `folder`."""
     folder.mkdir(parents=True, exist_ok=True)
+    if (folder / "poses.parquet").is_file():
+        return folder / "poses.parquet"
     odometry(field.folder, folder, inputs.bursts)
     batch(field.folder, folder, inputs.bursts)
     take_refined(
@@ -46,8 +49,12 @@ def estimated(field: Field, inputs: Inputs, folder: Path) -> Path:
 
 def errors_with(trajectory: Path, inputs: Inputs, folder: Path) -> WheelErrors:
     """Errors of the wheels of a drive with a trajectory and the true calibration."""
+    folder.mkdir(parents=True, exist_ok=True)
+    static = folder / "static_voxels.npz"
+    if not static.is_file():
+        static_of(folder, inputs.recording, inputs.bursts, inputs.calibration, trajectory)
     drive = inputs.recording, inputs.bursts, inputs.frames, inputs.calibration
-    return wheel_errors(excite_with(folder, *drive, trajectory), trajectory, inputs.truth)
+    return wheel_errors(excite_only(folder, *drive, trajectory, static), trajectory, inputs.truth)
 
 
 def main() -> None:
