@@ -21,6 +21,8 @@ from card.ground_truth.static_window import StaticWindow
 
 SINGLE = {"front_votes_min": 1, "front_votes_max": 1, "rear_votes_min": 1, "rear_votes_max": 1}
 FIXED = SINGLE | {"front_votes_min": 2, "front_votes_max": 2}
+#: Settings that leave out, at 0, what removes movers beside the share of moved votes.
+NEXT_TO_VOTES = ("vacated_votes", "brief_looks", "passes_per_hit", "attached_voxels", "surrounded_share")
 #: The steps of the paper's ablation figure and tables that decide on voxels, as changes of the defaults.
 ABLATION: Mapping[str, Mapping[str, Any]] = {
     "single_no_crop": {"flow_method": "off", "front_crop": "none", **SINGLE},
@@ -29,7 +31,7 @@ ABLATION: Mapping[str, Mapping[str, Any]] = {
     "adaptive": {"flow_method": "off"},
     "literal": {"flow_method": "literal"},
     "submap": {"flow_method": "submap"},
-    "votes_alone": {"vacated_votes": 0, "brief_looks": 0, "passes_per_hit": 0, "attached_voxels": 0},
+    "votes_alone": dict.fromkeys(NEXT_TO_VOTES, 0),
     "voxel_15cm": {"voxel_size_m": 0.15},
     "voxel_20cm": {"voxel_size_m": 0.2},
 }

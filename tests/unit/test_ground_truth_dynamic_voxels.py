@@ -11,9 +11,11 @@ from card.ground_truth.dynamic_voxels import (
     is_brief,
     looked_through,
     seldom_hit,
+    surrounded,
     vacated,
 )
 from card.ground_truth.reference.attached import attached as plain_attached
+from card.ground_truth.reference.attached import surrounded as plain_surrounded
 from card.ground_truth.visibility_votes import Votes
 from card.ground_truth.voxels import pack
 
@@ -41,7 +43,7 @@ def test_a_voxel_is_seldom_hit_if_most_sweeps_look_past_it():
 
 
 def test_what_stood_for_long_and_is_gone_is_dynamic():
-    some = votes(hits=[60] * 3, moved=[9, 6, 6], elsewhen=[5, 12, 13], moved_elsewhen=[5, 6, 6])
+    some = votes(hits=[60] * 3, moved=[9, 6, 6], elsewhen=[4, 10, 11], moved_elsewhen=[4, 5, 5])
     assert not contradicted(some, np.zeros(3, bool), SETTINGS).any()
     assert vacated(some, SETTINGS).tolist() == [False, True, False]
     assert not vacated(some, SETTINGS | {"vacated_votes": 0}).any()
@@ -97,3 +99,33 @@ def test_attached_voxels_are_those_of_the_plain_rounds(voxels, least, radius):
     found = attached(keys, dynamic, brief, hit, filled)
     assert np.array_equal(found, plain_attached(keys, dynamic, brief, hit, filled))
     assert not (found & ~dynamic & ~brief).any()
+
+
+def test_what_dynamic_voxels_surround_joins_them():
+    block = np.stack(np.meshgrid(*[np.arange(20, 23)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    far = np.array([[23, 21, 21], [60, 21, 21]])
+    keys = pack(np.concatenate([block, far]))
+    dynamic = np.r_[np.ones(27, bool), False, False]
+    dynamic[13] = False
+    assert surrounded(keys, dynamic, SETTINGS).tolist() == [True] * 28 + [False]
+    assert surrounded(keys, dynamic, SETTINGS | {"surrounded_share": 0}).sum() == 26
+    # A thin layer over a road of which it is the smaller part stays as it is.
+    road = np.stack(np.meshgrid(np.arange(20, 29), np.arange(20, 29), [20, 21], indexing="ij"), axis=-1)
+    cells = np.concatenate([road.reshape(-1, 3), [[24, 24, 22], [24, 25, 22], [25, 24, 22]]])
+    keys = np.sort(pack(cells))
+    above = np.isin(keys, pack(cells[-3:]))
+    assert surrounded(keys, above, SETTINGS).sum() == 3
+
+
+@settings(max_examples=80, deadline=None)
+@given(
+    st.lists(st.tuples(*[st.integers(0, 5)] * 3, st.booleans()), max_size=80, unique_by=lambda v: v[:3]),
+    st.integers(1, 4),
+    st.sampled_from([1, 2]),
+    st.sampled_from([0.3, 0.5, 0.8, 1.0]),
+)
+def test_surrounded_voxels_are_those_of_the_plain_rounds(voxels, least, radius, share):
+    table = np.array(sorted(voxels), dtype=np.int64).reshape(-1, 4)
+    keys, dynamic = pack(table[:, :3] + 50), table[:, 3] > 0
+    filled = SETTINGS | {"surrounded_voxels": least, "near_voxels": radius, "surrounded_share": share}
+    assert np.array_equal(surrounded(keys, dynamic, filled), plain_surrounded(keys, dynamic, filled))

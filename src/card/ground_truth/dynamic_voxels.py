@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from itertools import product
 from typing import Any
 
@@ -99,3 +99,41 @@ def attached(
         new = joins[~dynamic[joins]]
         dynamic[new] = True
     return dynamic
+
+
+def surrounded(keys: Index, dynamic: Mask, settings: Mapping[str, Any]) -> Mask:
+    """Dynamic voxels (C,) and those they surround; `reference.attached` has the same, plainly.
+
+    A voxel is dynamic if of the voxels in the cube of 2 `near_voxels` + 1 round it `surrounded_voxels` or
+    more, and a share of `surrounded_share` or more, are. What joins may let others join.
+
+    keys : (C,) increasing.
+    """
+    dynamic, share = dynamic.copy(), settings["surrounded_share"]
+    if not share:
+        return dynamic
+    radius, least = settings["near_voxels"], settings["surrounded_voxels"]
+    count = np.zeros(len(keys), dtype=np.int64)
+    new = np.flatnonzero(dynamic)
+    while len(new):
+        steps = np.zeros(len(keys) + 1, dtype=np.int64)
+        for low, high in _columns(keys, keys[new], radius):
+            np.add.at(steps, low, 1)
+            np.add.at(steps, high, -1)
+        count += np.cumsum(steps)[:-1]
+        near = np.flatnonzero(~dynamic & (count >= least))
+        others = sum(high - low for low, high in _columns(keys, keys[near], radius)) - 1
+        new = near[count[near] >= share * others]
+        dynamic[new] = True
+    return dynamic
+
+
+def _columns(keys: Index, of: Index, radius: int) -> Iterator[tuple[Index, Index]]:
+    """Positions [low, high) in `keys` of the voxels in each column of the cubes round voxels (N,).
+
+    Keys sort by z last, so that a column is a run of them.
+    """
+    cells = unpack(of)
+    for x, y in product(range(-radius, radius + 1), repeat=2):
+        low = np.searchsorted(keys, pack(cells + np.array([x, y, -radius])))
+        yield low, np.searchsorted(keys, pack(cells + np.array([x, y, radius])), side="right")

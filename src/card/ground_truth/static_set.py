@@ -16,6 +16,7 @@ from card.ground_truth.dynamic_voxels import (
     is_brief,
     looked_through,
     seldom_hit,
+    surrounded,
     vacated,
 )
 from card.ground_truth.icp_flow import dynamic_by_flow, flow_votes
@@ -97,8 +98,11 @@ def _dynamic_by_visibility(
     ):
         reasons[f"voxels_{reason}"] = int((found & ~dynamic).sum())
         dynamic |= found
-    whole = attached(voxels.keys[chosen], dynamic, brief, hit, settings)
-    reasons["voxels_attached"] = int((whole & ~dynamic).sum())
+    keys = voxels.keys[chosen]
+    joined = attached(keys, dynamic, brief, hit, settings)
+    whole = surrounded(keys, joined, settings)
+    reasons["voxels_attached"] = int((joined & ~dynamic).sum())
+    reasons["voxels_surrounded"] = int((whole & ~joined).sum())
     return whole, reasons
 
 

@@ -1,4 +1,4 @@
-"""What belongs to dynamic voxels in plain numpy: the same as `dynamic_voxels.attached`."""
+"""What belongs to dynamic voxels in plain numpy: the same as `dynamic_voxels.attached` and `surrounded`."""
 
 from __future__ import annotations
 
@@ -25,6 +25,21 @@ def attached(
     least = settings["attached_voxels"]
     while least:
         joins = brief & ~dynamic & ((near & together)[:, dynamic].sum(axis=1) >= least)
+        if not joins.any():
+            break
+        dynamic = dynamic | joins
+    return dynamic.copy()
+
+
+def surrounded(keys: Index, dynamic: Mask, settings: Mapping[str, Any]) -> Mask:
+    """See `dynamic_voxels.surrounded`: rounds over all pairs of voxels until none joins."""
+    cells = unpack(keys)
+    near = np.abs(cells[:, None] - cells).max(axis=2, initial=0) <= settings["near_voxels"]
+    others = near.sum(axis=1) - 1
+    share = settings["surrounded_share"]
+    while share:
+        count = near[:, dynamic].sum(axis=1)
+        joins = ~dynamic & (count >= settings["surrounded_voxels"]) & (count >= share * others)
         if not joins.any():
             break
         dynamic = dynamic | joins
