@@ -14,19 +14,12 @@ from card.artifacts.processes import in_processes
 from card.calibration.board import Board
 from card.calibration.chessboard import find_chessboard
 from card.calibration.spread import spread
+from card.calibration.stereo_views import View, list_views
 from card.errors import CardError
-from card.recording.paths import CAMERAS, list_images, stamp_of
+from card.recording.paths import CAMERAS, stamp_of
 
 BOARD = "board.yaml"
 _SAMPLE = 12
-
-
-@dataclass(frozen=True)
-class View:
-    """One stereo pair: its name, and the image of each camera, left and right."""
-
-    name: str
-    images: tuple[Path, Path]
 
 
 @dataclass(frozen=True)
@@ -71,7 +64,7 @@ def detect_boards(
     def look(job: tuple[View, int]) -> Seen:
         return _look(job[0].images[job[1]], board, settings["boards"])
 
-    check_sample(jobs, look, session, board)
+    _check_sample(jobs, look, session, board)
     found = list(progress(in_processes(look, jobs, threads), f"boards of {session.name}", len(jobs)))
     _check_sizes(jobs, found)
     refused = [
@@ -105,37 +98,7 @@ def detect_boards(
     )
 
 
-def list_views(session: Path, max_delay_ms: float) -> tuple[list[View], list[str]]:
-    """Stereo pairs of a session or a survey in order of time, and a note for each image without a partner."""
-    if (session / CAMERAS[0]).is_dir():
-        folders = [session]
-    else:
-        folders = sorted(path.parent for path in session.glob(f"survey-*/pose-*/{CAMERAS[0]}"))
-    views, notes = [], []
-    for folder in folders:
-        left, right = (list_images(folder, camera) for camera in CAMERAS)
-        stamps = np.array([stamp_of(path) for path in right], dtype=np.int64)
-        alone = set(right)
-        for path in left:
-            delay = np.abs(stamps - stamp_of(path))
-            if not len(delay) or delay.min() > max_delay_ms * 1e6:
-                notes.append(f"{path.relative_to(session)} has no right image within {max_delay_ms:g} ms")
-                continue
-            partner = right[int(np.argmin(delay))]
-            alone.discard(partner)
-            views.append(View(_name(session, folder, path, len(left)), (path, partner)))
-        notes += [f"{path.relative_to(session)} has no left image" for path in sorted(alone)]
-    if not views:
-        raise CardError(
-            "no stereo pairs",
-            where=session,
-            found=notes[0] if notes else None,
-            wanted="camera_left, camera_right",
-        )
-    return views, notes
-
-
-def check_sample(
+def _check_sample(
     jobs: Sequence[tuple[View, int]], look: Callable[[tuple[View, int]], Seen], session: Path, board: Board
 ) -> None:
     """A few images, spread over the session, show the board: else all the others would be searched in vain.
@@ -159,13 +122,6 @@ def _no_board(session: Path, reason: str, board: Board) -> CardError:
         found=reason,
         wanted=f"{board.columns} x {board.rows} inner corners, as {BOARD} says",
     )
-
-
-def _name(session: Path, folder: Path, image: Path, count: int) -> str:
-    if folder == session:
-        return image.stem
-    name = folder.relative_to(session).as_posix()
-    return name if count == 1 else f"{name}/{image.stem}"
 
 
 def _look(path: Path, board: Board, settings: Mapping[str, Any]) -> Seen:
