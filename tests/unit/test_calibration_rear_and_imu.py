@@ -88,6 +88,9 @@ def test_finds_rear_lidar_imu_and_channels(lively: tuple[Yard, Path]) -> None:
         z = off / corrections_row(document["sigmas"][name])
         assert np.sqrt(np.mean(z**2)) < 2.0
     assert document["verdict"] == {"passed": True, "reasons": []}
+    # Registering single sweeps is the second witness, without channels and along the odometry alone.
+    assert document["quality"]["start_deg"] < 0.15
+    assert document["quality"]["start_mm"] < 15
     assert document["observability"]["rear"]["rotation"] == "drive"
     report = json.loads((folder / "rear_and_imu.report.json").read_text())
     assert {figure["name"] for figure in report["figures"]} >= {"rear_sigma_deg", "imu_sigma_mm"}

@@ -212,7 +212,9 @@ def _imu(solution: Solution, sigma: Array) -> dict[str, Any]:
 
 def _quality(solution: Solution, priors: Priors, alone: Alone, rays: Rays) -> dict[str, Any]:
     state, fit = solution.state, solution.fit
-    start = difference(state.mounted[REAR], alone.rig_from_lidar)
+    # Single sweeps were registered along the path of a front LiDAR that was mounted as drawn.
+    single = inverse(priors.mounted[FRONT]) @ alone.rig_from_lidar
+    start = difference(relative(state.mounted)[0], single)
     off = (state.corrections[FRONT] - priors.corrections[FRONT]) / priors.corrections_sigma[FRONT]
     return {
         "duration_s": float((state.t_ns[-1] - state.t_ns[0]) * 1e-9),
