@@ -43,7 +43,7 @@ def test_a_voxel_is_seldom_hit_if_most_sweeps_look_past_it():
 
 
 def test_what_stood_for_long_and_is_gone_is_dynamic():
-    some = votes(hits=[60] * 3, moved=[9, 6, 6], elsewhen=[4, 10, 11], moved_elsewhen=[4, 5, 5])
+    some = votes(hits=[60] * 3, moved=[9, 6, 6], elsewhen=[5, 12, 13], moved_elsewhen=[5, 6, 6])
     assert not contradicted(some, np.zeros(3, bool), SETTINGS).any()
     assert vacated(some, SETTINGS).tolist() == [False, True, False]
     assert not vacated(some, SETTINGS | {"vacated_votes": 0}).any()
