@@ -1,4 +1,4 @@
-"""Calibration of a sequence: from a delivered bundle."""
+"""Calibration of a sequence: from the raw sessions of its day, or from a delivered bundle."""
 
 from card.calibration.import_bundle import import_bundle
 
