@@ -35,7 +35,7 @@ LIDARS = ("lidar_front", "lidar_rear")
 # What an evaluation depends on; not on which methods there are.
 PROTOCOL = [name for name in SETTINGS["benchmark"] if name not in ("methods", "split")]
 # Scripts inherit it: sums of linear algebra on another number of cores would have other last digits.
-os.environ["OPENBLAS_NUM_THREADS"] = "1"
+os.environ.update(OPENBLAS_NUM_THREADS="1")
 
 
 def load_plan():

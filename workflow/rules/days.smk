@@ -114,3 +114,33 @@ def drift_report(sequence):
         day=sequence.session[:10],
         mode=calibration_mode(sequence.id),
     )[0]
+
+
+def step_cfg(*names):
+    """Settings of a step of the calibration; its figures are gated in the bundle of a sequence."""
+    return {"settings": cfg("calibration", *names)["settings"], "gates": []}
+
+
+def session_fingerprint(*names):
+    """A param function: fingerprint of the named files and folders of a session or survey."""
+
+    def of_session(wildcards):
+        session = getattr(wildcards, "session", None) or f"{wildcards.day}-leica"
+        folder = Path(RAW, "sessions", session)
+        cache = Path("results", "sessions", session, "fingerprints")
+        found = [path for name in names for path in sorted(folder.glob(name))] or [
+            folder / names[0]
+        ]
+        return {
+            str(path.relative_to(folder)): fingerprint(
+                path, cache / f"{'-'.join(path.relative_to(folder).parts)}.json"
+            )
+            for path in found
+        }
+
+    return of_session
+
+
+def first_session(wildcards):
+    """The survey follows the day's first session: its cameras look at the board."""
+    return f"results/sessions/{sessions_of(wildcards.day)[0]}/front_lidar.json"
