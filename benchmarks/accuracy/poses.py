@@ -10,6 +10,7 @@ from references import SYSTEMS, reference_trajectories
 
 from card.artifacts import read_table
 from card.geometry import Trajectory, apply, inverse
+from card.geometry.rigid_alignment import align
 
 Array = NDArray[np.float64]
 AIMS = {
@@ -59,7 +60,7 @@ def trajectory_errors(found: Trajectory, true: Trajectory) -> dict[str, float]:
     """
     t_ns = found.t_ns[(found.t_ns >= true.start_ns) & (found.t_ns <= true.end_ns)]
     poses, reference = found.at(t_ns), true.at(t_ns)
-    aligned = apply(align(poses[:, :3, 3], reference[:, :3, 3]), poses[:, :3, 3])
+    aligned = apply(align(reference[:, :3, 3], poses[:, :3, 3]), poses[:, :3, 3])
     ate = np.linalg.norm(aligned - reference[:, :3, 3], axis=1)
     later = t_ns[t_ns + SECOND_NS <= t_ns[-1]] + SECOND_NS
     step, true_step = (
@@ -90,17 +91,6 @@ def revisit_z(found: Trajectory, true: Trajectory) -> float:
         if distance.min() < REVISIT_M:
             differences.append(abs(error[later] - error[int(np.argmin(distance))]))
     return float(np.median(differences)) if differences else float("nan")
-
-
-def align(points: Array, reference: Array) -> Array:
-    """The rigid transform (4, 4) that brings points (N, 3) closest to a reference (N, 3), by Kabsch."""
-    center, reference_center = points.mean(axis=0), reference.mean(axis=0)
-    u, _, vt = np.linalg.svd((reference - reference_center).T @ (points - center))
-    rotation = u @ np.diag([1, 1, np.sign(np.linalg.det(u @ vt))]) @ vt
-    result = np.eye(4)
-    result[:3, :3] = rotation
-    result[:3, 3] = reference_center - rotation @ center
-    return result
 
 
 def _median(values: Sequence[float]) -> float | None:

@@ -56,7 +56,7 @@ def test_alignment_agrees_with_scipy() -> None:
     rng = np.random.default_rng(0)
     points, reference = bend()[:, :3, 3], bend()[:, :3, 3] @ Rotation.random(rng=rng).as_matrix()
     reference = reference + rng.normal(0, 0.1, reference.shape)
-    found = accuracy("poses").align(points, reference)
+    found = accuracy("poses").align(reference, points)
     witness, _ = Rotation.align_vectors(reference - reference.mean(axis=0), points - points.mean(axis=0))
     np.testing.assert_allclose(found[:3, :3], witness.as_matrix(), atol=1e-6)
 

@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from card.geometry.rigid_alignment import rotation_between
+
 Array = NDArray[np.float64]
 
 _ROUNDS = 10
@@ -19,8 +21,7 @@ def align_planes(normals_a: Array, offsets_a: Array, normals_b: Array, offsets_b
     keep = np.ones(len(normals_a), dtype=np.bool_)
     pose = np.eye(4)
     for _ in range(_ROUNDS):
-        u, _, vt = np.linalg.svd(normals_a[keep].T @ normals_b[keep])
-        pose[:3, :3] = u @ np.diag([1, 1, np.sign(np.linalg.det(u @ vt))]) @ vt
+        pose[:3, :3] = rotation_between(normals_a[keep], normals_b[keep])
         turned = normals_b @ pose[:3, :3].T
         pose[:3, 3] = np.linalg.lstsq(turned[keep], (offsets_a - offsets_b)[keep], rcond=None)[0]
         angle = np.linalg.norm(np.cross(normals_a, turned), axis=1)

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from card.calibration.corner_residuals import Corners, skew
 from card.calibration.front_sensors import CAMERA_PARAMETERS, FrontSensors
 from card.calibration.residuals import Linear
-from card.calibration.rigid_alignment import align
 from card.calibration.state import State, moved
 from card.errors import CardError
 from card.geometry import apply
+from card.geometry.rigid_alignment import align
 
 Array = NDArray[np.float64]
 

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from card.calibration.rigid_alignment import align, misfit
 from card.calibration.survey_points import WHEEL_POINTS, Survey
 from card.errors import CardError
+from card.geometry.rigid_alignment import align, misfit
 
 Array = NDArray[np.float64]
 

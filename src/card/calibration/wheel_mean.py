@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from card.calibration.corner_residuals import skew
 from card.calibration.front_sensors import CAMERA_PARAMETERS, FrontSensors
-from card.calibration.rigid_alignment import align
 from card.calibration.state import moved, step_between
 from card.calibration.survey_alignment import Alignment
 from card.geometry import apply
+from card.geometry.rigid_alignment import align
 
 Array = NDArray[np.float64]
 
