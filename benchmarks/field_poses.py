@@ -22,9 +22,9 @@ from references import odometry_of_others
 from speed.poses import batch, odometry, write_bursts_table
 
 from card.artifacts import atomic_file, read_table
-from card.estimation.imu import Imu, read_imu
+from card.estimation.imu import Imu
 from card.geometry import Trajectory
-from card.recording.paths import imu_path
+from card.poses.inputs import open_imu
 from card.simulation.imu import RATE_HZ, ImuErrors, ideal_imu
 
 WORK = OUT.parent / "field_poses"
@@ -40,7 +40,7 @@ def figures_of(field: Field, folder: Path) -> dict[str, float]:
     true = _trajectory(field.truth / "trajectory.parquet")
     figures = trajectory_errors(_trajectory(folder / "trajectory.parquet"), true)
     nodes = read_table(folder / "nodes.parquet", "pose_graph_nodes")
-    imu = read_imu(read_table(imu_path(field.recording), "imu"))
+    imu = open_imu(field.recording, field.calibration)
     off = np.abs(bias_errors(nodes, imu, true))
     return figures | {"biases_within_pct": 100 * float(np.mean(off < SIGMAS))}
 
@@ -48,9 +48,8 @@ def figures_of(field: Field, folder: Path) -> dict[str, float]:
 def bias_errors(nodes: Any, imu: Imu, true: Trajectory) -> np.ndarray:
     """Errors (6,) of the biases of gyro and accelerometer at the middle node, in standard deviations.
 
-    The true bias is what the IMU measured beyond rate and force of the true motion, in the mean of the drive:
-    what its axes and scales make of gravity is in it, as it is for the batch. The white noise of that mean
-    is added to the node's sigma.
+    The true bias is what the corrected IMU has beyond rate and force of the true motion, in the mean of the
+    drive. The white noise of that mean is added to the node's sigma.
     """
     inside = (imu.t_ns > true.start_ns + 1e8) & (imu.t_ns < true.end_ns - 1e8)
     ideal = ideal_imu(true, imu.t_ns[inside])

@@ -11,12 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
-from card.artifacts import default_settings, read_table
-from card.estimation.imu import read_imu
+from card.artifacts import default_settings
 from card.estimation.odometry import covered_sweeps
 from card.geometry import Trajectory, quaternion_from_matrix
-from card.poses.estimate_odometry import open_scans
-from card.recording.paths import imu_path
+from card.poses.inputs import open_imu, open_scans
 
 #: Both take their start for a standstill, and catch up with a car that moves within some scans.
 SETTLING_S = 3.0
@@ -43,7 +41,7 @@ def odometry_of_others(recording: Path, bursts: Path, calibration: Path) -> dict
     if not python:
         return {}
     scans = open_scans(recording, bursts, calibration, default_settings("odometry") | {"max_range_m": 100.0})
-    imu = read_imu(read_table(imu_path(recording), "imu"))
+    imu = open_imu(recording, calibration)
     chosen = covered_sweeps(scans, imu)
     found = {}
     with tempfile.TemporaryDirectory(prefix="card-reference-") as scratch:

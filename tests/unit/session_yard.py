@@ -87,7 +87,7 @@ def yard(
     unit = ImuUnit(np.linalg.inv(units[0]), np.linalg.inv(units[1]))
     t_ns = imu_times(START_NS, seconds)
     table = measured_imu(path, t_ns, errors, unit, rng)
-    imu = read_imu(table)
+    imu = read_imu(table, None)
     bursts = []
     for lidar, name in enumerate(LIDARS):
         first = START_NS + SPIN_PHASE_NS[name]

@@ -13,7 +13,7 @@ from card.geometry import Trajectory, transform
 from card.recording.burst import Burst
 from card.recording.laz import write_burst
 from card.simulation.calibrations import true_calibration
-from card.simulation.rig import lidar_elevations_rad
+from card.simulation.rig import ImuUnit, lidar_elevations_rad
 
 START_NS = 1_776_153_600_000_000_000
 PERIOD_NS = 100_000_000
@@ -21,6 +21,10 @@ GRAVITY = np.array([0, 0, 9.81])
 WXYZ = [3, 0, 1, 2]
 PHASE_NS = {"lidar_front": 3_000_000, "lidar_rear": 45_000_000}
 GROUND = -1.7
+UNIT = ImuUnit(
+    np.array([[1.01, -4e-3, 6e-3], [0, 0.992, 5e-3], [0, 0, 0.985]]),
+    np.array([[0.99, 5e-3, -6e-3], [0, 1.01, 4e-3], [0, 0, 1.006]]),
+)
 Motion = Callable[[np.ndarray], tuple[np.ndarray, Rotation]]
 
 
@@ -80,7 +84,8 @@ def standing(t: np.ndarray) -> tuple[np.ndarray, Rotation]:
 class Street:
     """What a drive is made of; `record` writes it down.
 
-    gyro_bias, accel_bias : (3,) SI.  imu_delay_s : how late the IMU's stamps are.  lidars : those on board.
+    gyro_bias, accel_bias : (3,) SI, of the corrected IMU.  unit : its scales and axes.  imu_delay_s : how
+    late the IMU's stamps are.  lidars : those on board.
     """
 
     boxes: np.ndarray
@@ -90,6 +95,7 @@ class Street:
     range_noise: float = 0.005
     gyro_bias: np.ndarray = field(default_factory=lambda: np.array([1e-3, -5e-4, 8e-4]))
     accel_bias: np.ndarray = field(default_factory=lambda: np.array([0.02, -0.01, 0.015]))
+    unit: ImuUnit = UNIT
     imu_delay_s: float = 0.0
     lidars: tuple[str, ...] = ("lidar_front",)
     seed: int = 0
@@ -112,8 +118,8 @@ class Street:
         (before, r0), (now, r), (after, r1) = (self.motion(t + d) for d in (-step, 0, step))
         gyro = (r0.inv() * r1).as_rotvec() / (2 * step) + self.gyro_bias
         accel = r.inv().apply((after - 2 * now + before) / step**2 + GRAVITY) + self.accel_bias
-        gyro = gyro + rng.normal(0, 1e-4 * np.sqrt(200), gyro.shape)
-        accel = accel + rng.normal(0, 1e-3 * np.sqrt(200), accel.shape)
+        gyro = (gyro + rng.normal(0, 1e-4 * np.sqrt(200), gyro.shape)) @ self.unit.gyro.T
+        accel = (accel + rng.normal(0, 1e-3 * np.sqrt(200), accel.shape)) @ self.unit.accel.T
         columns = {"t_ns": START_NS + np.round((t + self.imu_delay_s) * 1e9).astype(np.int64)}
         for i, axis in enumerate("xyz"):
             columns |= {f"gyro_{axis}": gyro[:, i], f"accel_{axis}": accel[:, i]}
@@ -146,6 +152,10 @@ class Street:
         # The boxes are measured without error: nothing is to be corrected.
         for corrections in calibration["lidar_corrections"].values():
             corrections |= {name: 0.0 if name == "range_offset_m" else [0.0] * 32 for name in corrections}
+        calibration["imu_corrections"] = {
+            name: np.linalg.inv(matrix).tolist()
+            for name, matrix in (("gyro", self.unit.gyro), ("accel", self.unit.accel))
+        }
         lidar = {"model": "XT32", "clock": "synchronised", "deskewed": False}
         imu = {"model": "IMU", "clock": "synchronised"}
         description = {"id": "street", "rig": "r", "day": "2026-04-14", "place": "p", "country": "DE"}

@@ -66,6 +66,7 @@ def _rear_and_imu(scene_seed: int) -> dict[str, Any]:
     document["extrinsics"] = {name: to_json(pose) for name, pose in poses.items()}
     document["covariances"] = dict.fromkeys(document["covariances"], small)
     document["corrections"] = document["sigmas"] = true
+    document["imu"] |= {f"{name}_matrix": (1.001 * np.eye(3)).tolist() for name in ("gyro", "accel")}
     document["verdict"] = {"passed": False, "reasons": ["imu_sigma_mm 7, at most 6"]}
     return document
 
@@ -130,6 +131,7 @@ def test_a_bundle_is_the_car(scene: Scene, tmp_path: Path) -> None:
     assert bundle["camera_left_undistorted"] == drawing["camera_left_undistorted"]
     assert np.shape(bundle["covariances"]["wheels"]) == (24, 24)
     assert np.shape(bundle["covariances"]["camera_right"]) == (9, 9)
+    assert bundle["imu_corrections"] == dict.fromkeys(("gyro", "accel"), (1.001 * np.eye(3)).tolist())
     assert bundle["quality"]["failed_limits"] == ["rear_and_imu: imu_sigma_mm 7, at most 6"]
     report = read_json(tmp_path / "calibration.report.json", "report")
     figures = {figure["name"]: figure["value"] for figure in report["figures"]}

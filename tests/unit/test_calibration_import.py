@@ -65,6 +65,13 @@ def test_bundle_and_mask_arrive_as_delivered(session: Path) -> None:
     assert {f["name"]: f["value"] for f in report["figures"]}["baseline_m"] == pytest.approx(0.6, abs=0.02)
 
 
+def test_a_bundle_may_know_nothing_of_the_imu(session: Path) -> None:
+    bundle = json.loads((session / "calibration.json").read_text())
+    del bundle["imu_corrections"]
+    save(session, bundle)
+    assert "imu_corrections" not in run(session)[0]
+
+
 def test_an_absent_mask_is_empty_and_noted(session: Path) -> None:
     bundle, mask, report = run(session)
     size = bundle["camera_left_undistorted"]
@@ -141,6 +148,14 @@ def angles_in_degrees(bundle: Document) -> None:
     bundle["lidar_corrections"]["lidar_rear"]["channel_elevation_offset_rad"][7] = -0.3
 
 
+def imu_in_per_cent(bundle: Document) -> None:
+    bundle["imu_corrections"]["gyro"][1][1] = 1.2
+
+
+def imu_transposed(bundle: Document) -> None:
+    bundle["imu_corrections"]["accel"] = np.transpose(bundle["imu_corrections"]["accel"]).tolist()
+
+
 def negative_variance(bundle: Document) -> None:
     bundle["covariances"]["rig_from_lidar_front"][2][2] = -1e-6
 
@@ -161,6 +176,11 @@ BAD: list[tuple[Callable[[Document], None], str]] = [
     (wheels_in_centimetres, "implausible track between wheels fl and fr"),
     (range_in_millimetres, r"range_offset_m of lidar_front out of range \(found 0.08"),
     (angles_in_degrees, r"channel_elevation_offset_rad of channel 7 of lidar_rear out of range \(found -0.3"),
+    (
+        imu_in_per_cent,
+        r"imu_corrections of gyro out of range in row 1, column 1 \(found 1.2, wanted 1 within",
+    ),
+    (imu_transposed, "imu_corrections of accel are not upper triangular"),
     (negative_variance, "covariance of rig_from_lidar_front is not positive semidefinite"),
     (lopsided_covariance, "covariance of rig_from_lidar_front is not symmetric"),
 ]

@@ -9,14 +9,14 @@ import pytest
 from scipy.spatial.transform import Rotation
 from street_scene import START_NS, Street, houses, standing, swaying, tunnel
 
-from card.artifacts import default_settings, read_json, read_table, write_table
+from card.artifacts import default_settings, read_json, read_table, write_json, write_table
 from card.errors import CardError
-from card.estimation.imu import read_imu
 from card.estimation.odometry import rehearsed
 from card.estimation.scans import Scans
 from card.estimation.smoother import State
 from card.geometry import Trajectory, inverse
 from card.poses.estimate_odometry import estimate_odometry
+from card.poses.inputs import open_imu
 from card.recording.laz import read_burst, write_burst
 
 
@@ -89,6 +89,16 @@ def test_a_drive_that_starts_in_motion_is_followed_to_millimetres(street: Street
     assert report["notes"] == []
 
 
+def test_the_calibration_corrects_the_imu(street: Street, copy: Path) -> None:
+    calibration = read_json(copy / "calibration.json", "calibration")
+    del calibration["imu_corrections"]
+    write_json(copy / "calibration.json", calibration, "calibration")
+    table, _ = run(copy)
+    last = np.array([table[f"gyro_bias_{axis}"][-1].as_py() for axis in "xyz"])
+    # A scale of 1.5 % less of a turn, and as much of gravity, is taken for biases.
+    assert np.abs(last - street.gyro_bias).max() > 1e-3
+
+
 def test_a_start_that_scans_alone_tell_poorly_is_mended_by_a_rehearsal(street: Street, folder: Path) -> None:
     settings = default_settings("odometry")
     scans = _scans(folder, read_table(folder / "bursts.parquet", "bursts"))
@@ -100,7 +110,7 @@ def test_a_start_that_scans_alone_tell_poorly_is_mended_by_a_rehearsal(street: S
     wrong = Rotation.from_rotvec([0.06, -0.08, 0.0]).apply(-9.81 * up)
     slow = velocity - np.array([0.3, 0.5, 0.1])
     start = State(t_ns, np.eye(4), slow, np.zeros(3), np.zeros(3), wrong)
-    imu = read_imu(read_table(folder / "imu.parquet", "imu"))
+    imu = open_imu(folder, folder / "calibration.json")
     found = rehearsed(opening, start, imu, settings)
     assert found.t_ns == t_ns
     assert np.linalg.norm(found.velocity - velocity) < 0.2 * np.linalg.norm(slow - velocity)

@@ -13,11 +13,11 @@ from card.artifacts import default_settings, read_json, read_table, write_table
 from card.errors import CardError
 from card.estimation.batch import Nodes
 from card.estimation.dense import dense_trajectory
-from card.estimation.imu import read_imu
 from card.estimation.odometry import plane_settings
 from card.geometry import Trajectory, inverse, transform
 from card.poses.anchor import anchor
-from card.poses.estimate_odometry import estimate_odometry, open_scans
+from card.poses.estimate_odometry import estimate_odometry
+from card.poses.inputs import open_imu, open_scans
 from card.poses.loops import LoopVerifier, candidates, travelled
 from card.poses.map_quality import map_figures
 from card.poses.pose_graph import refine_odometry
@@ -280,7 +280,7 @@ def test_what_scans_leave_open_is_named(
 
 
 def test_between_nodes_the_trajectory_follows_the_imu_through_them(street: Street, folder: Path) -> None:
-    imu = read_imu(read_table(folder / "imu.parquet", "imu")).without(street.gyro_bias, street.accel_bias)
+    imu = open_imu(folder, folder / "calibration.json").without(street.gyro_bias, street.accel_bias)
     t_ns = START_NS + np.arange(2, 57, 3) * 100_000_000 + 1_234_567
     speed = (street.poses(t_ns + 100_000) - street.poses(t_ns - 100_000))[:, :3, 3] / 2e-4
     zero = np.zeros((len(t_ns), 3))

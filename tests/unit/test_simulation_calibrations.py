@@ -7,7 +7,7 @@ from card.artifacts import check
 from card.errors import CardError
 from card.geometry import from_json
 from card.simulation.calibrations import delivered_calibration, true_calibration
-from card.simulation.rig import nominal_rig
+from card.simulation.rig import built_rig, nominal_rig
 
 START, MID = "2026-04-14-start", "2026-04-14-mid"
 SENSORS = ("camera_left", "camera_right", "lidar_front", "lidar_rear")
@@ -52,6 +52,21 @@ def test_the_errors_of_deliveries_have_the_covariance_they_state() -> None:
             squares.append(error @ np.linalg.solve(bundle["covariances"][f"rig_from_{sensor}"], error))
         # Mean of 120 chi-squares with 6 degrees of freedom: 6 +- 4 standard errors.
         assert np.mean(squares) == pytest.approx(6, abs=4 * np.sqrt(12 / 120)), sensor
+
+
+def test_the_imu_is_undone_by_its_corrections_which_a_delivery_has_nearly_right() -> None:
+    errors = []
+    for seed in range(60):
+        unit = built_rig(START[:10], seed, 80, 80).imu
+        truth = true_calibration(START, seed, "tiny")["imu_corrections"]
+        given = delivered_calibration(START, seed, "tiny", views=3)["imu_corrections"]
+        for name in ("gyro", "accel"):
+            np.testing.assert_allclose(np.array(truth[name]) @ getattr(unit, name), np.eye(3), atol=1e-12)
+            assert not np.tril(given[name], -1).any()
+        errors.append([np.subtract(given[name], truth[name]) for name in ("gyro", "accel")])
+    sigma = np.sqrt(np.mean(np.square(errors), axis=0))
+    assert sigma[0, 2, 2] == pytest.approx(6e-5, rel=0.4)
+    assert sigma[1, 2, 2] == pytest.approx(7e-4, rel=0.4)
 
 
 def test_stereo_is_known_far_better_than_each_camera() -> None:

@@ -103,6 +103,7 @@ def bundle_of(session: str, steps: Mapping[str, Document], drawing: Document) ->
             for i, wheel in enumerate(WHEELS)
         },
         "lidar_corrections": {name: rear["corrections"][name] for name in LIDARS},
+        "imu_corrections": {name: rear["imu"][f"{name}_matrix"] for name in ("gyro", "accel")},
         "covariances": covariances,
         "quality": {
             "stereo_reprojection_px": front["quality"]["reprojection_rms_px"],

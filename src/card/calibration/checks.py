@@ -28,6 +28,8 @@ def check_bundle(bundle: Document, settings: Mapping[str, Any], where: object) -
     check_cameras(bundle, settings, where)
     check_wheels(bundle["wheels"], settings, where)
     check_corrections(bundle["lidar_corrections"], settings, where)
+    if "imu_corrections" in bundle:
+        check_imu_corrections(bundle["imu_corrections"], settings["max_imu_correction"], where)
     check_covariances(bundle["covariances"], where)
 
 
@@ -141,6 +143,23 @@ def check_corrections(corrections: Document, settings: Mapping[str, Any], where:
                     found=f"{values[worst]:g}",
                     wanted=f"at most {limit:g} either way; degrees or millimetres?",
                 )
+
+
+def check_imu_corrections(corrections: Document, limit: float, where: object) -> None:
+    """What is wrong with the IMU's axes is small, and not a rotation, which is in the extrinsics."""
+    for name, rows in corrections.items():
+        matrix = np.asarray(rows, dtype=np.float64)
+        if np.any(np.tril(matrix, -1)):
+            raise CardError(f"imu_corrections of {name} are not upper triangular", where=where)
+        off = matrix - np.eye(3)
+        i, j = np.unravel_index(int(np.argmax(np.abs(off))), off.shape)
+        if abs(off[i, j]) > limit:
+            raise CardError(
+                f"imu_corrections of {name} out of range in row {i}, column {j}",
+                where=where,
+                found=f"{matrix[i, j]:g}",
+                wanted=f"{'1' if i == j else '0'} within {limit:g}",
+            )
 
 
 def check_covariances(covariances: Document, where: object) -> None:

@@ -63,7 +63,7 @@ def calibrate_rear_and_imu(
         another clock; a mounting that is not where the drawing has it.
     """
     own = settings["rear_and_imu"]
-    imu = read_imu(read_table(imu_path(drive), "imu"))
+    imu = read_imu(read_table(imu_path(drive), "imu"), None)
     limits = Limits(own["min_range_m"], own["max_range_m"], ALL_ROUND)
     rays = read_rays(drive, limits, own["returns_per_sweep"], threads)
     _check_length(rays, imu, own["min_drive_s"], drive)

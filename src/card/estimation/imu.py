@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from card.errors import CardError
 
@@ -51,6 +51,10 @@ class Imu:
         """The samples from the last to the first."""
         return Imu(self.t_ns[::-1], self.gyro[::-1], self.accel[::-1])
 
+    def corrected(self, gyro_matrix: ArrayLike, accel_matrix: ArrayLike) -> "Imu":
+        """The samples of a unit without errors of scale and axes: matrices (3, 3) times what was measured."""
+        return Imu(self.t_ns, self.gyro @ np.transpose(gyro_matrix), self.accel @ np.transpose(accel_matrix))
+
     def without(self, gyro_bias: Array, accel_bias: Array) -> "Imu":
         """The samples less biases (3,) or, one a sample, (N, 3)."""
         return Imu(self.t_ns, self.gyro - gyro_bias, self.accel - accel_bias)
@@ -73,8 +77,15 @@ class ImuNoise:
         return cls(**{name: float(settings[name]) for name in cls.__dataclass_fields__})
 
 
-def read_imu(table: Any, start_ns: int | None = None, end_ns: int | None = None) -> Imu:
+def read_imu(
+    table: Any,
+    corrections: Mapping[str, Any] | None,
+    start_ns: int | None = None,
+    end_ns: int | None = None,
+) -> Imu:
     """The samples of a table of schema ``imu``, all or those within a span of time.
+
+    corrections : ``imu_corrections`` of the calibration, which are applied; None if they are not known.
 
     Raises
     ------
@@ -97,7 +108,8 @@ def read_imu(table: Any, start_ns: int | None = None, end_ns: int | None = None)
     gyro, accel = (
         np.stack([column[name][inside] for name in _names(kind)], axis=1) for kind in ("gyro", "accel")
     )
-    return Imu(column["t_ns"][inside], gyro, accel)
+    measured = Imu(column["t_ns"][inside], gyro, accel)
+    return measured if corrections is None else measured.corrected(corrections["gyro"], corrections["accel"])
 
 
 def _names(kind: str) -> list[str]:

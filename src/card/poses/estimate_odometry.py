@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from card.artifacts import Figure, read_json, read_table, write_report, write_table
+from card.artifacts import Figure, write_report, write_table
 from card.errors import CardError
-from card.estimation.imu import read_imu
 from card.estimation.odometry import Step, plane_settings, run_odometry
 from card.estimation.scan_checks import check_against_scans, check_imu
-from card.estimation.scans import Limits, Scans
+from card.estimation.scans import Scans
 from card.geometry import quaternion_from_matrix
+from card.poses.inputs import open_imu, open_scans
 from card.recording.description import read_description
 from card.recording.paths import imu_path
 
@@ -40,7 +40,7 @@ def estimate_odometry(
     CardError
         For an IMU with a gap, in other units or axes, or on another clock; for sweeps without a time a point.
     """
-    imu = read_imu(read_table(imu_path(recording), "imu"))
+    imu = open_imu(recording, calibration)
     check_imu(imu, settings["max_imu_gap_s"], imu_path(recording))
     description = read_description(recording)
     scans = open_scans(recording, bursts, calibration, settings)
@@ -80,19 +80,6 @@ def estimate_odometry(
         figures=figures,
         gates=gates,
         notes=notes,
-    )
-
-
-def open_scans(recording: Path, bursts: Path, calibration: Path, settings: Mapping[str, Any]) -> Scans:
-    """The sweeps of a recording that the settings choose."""
-    low, high = settings["azimuth_deg"]
-    return Scans(
-        recording,
-        read_table(bursts, "bursts"),
-        read_json(calibration, "calibration"),
-        read_description(recording)["sensors"],
-        settings["lidars"],
-        Limits(settings["min_range_m"], settings["max_range_m"], (low, high)),
     )
 
 

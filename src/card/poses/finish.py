@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from card.artifacts import Figure, read_json, read_table, write_json, write_report, write_table
-from card.estimation.imu import Imu, read_imu
+from card.estimation.imu import Imu
 from card.estimation.imu_checks import imu_figures
 from card.geometry import Trajectory, inverse, quaternion_from_matrix
 from card.poses.anchor import anchor, tilt_deg
+from card.poses.inputs import open_imu
 from card.poses.map_quality import map_figures
 from card.poses.members import pose_document, read_members
 from card.poses.plausibility import check_coverage, check_motion, check_upright
@@ -79,7 +80,7 @@ def write_poses(
     result = anchored
     if imu_path(recording).is_file():
         inputs["imu"] = imu_path(recording)
-        imu = read_imu(read_table(imu_path(recording), "imu"), anchored.start_ns, anchored.end_ns)
+        imu = open_imu(recording, calibration, anchored.start_ns, anchored.end_ns)
         imu_agreement, causes = imu_figures(imu, anchored, settings["imu_window_s"])
         figures += imu_agreement
         notes += causes

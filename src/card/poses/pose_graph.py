@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from card.artifacts import atomic_file, read_table, write_report, write_table
 from card.estimation.batch import Batch, Nodes, write_g2o
 from card.estimation.dense import dense_trajectory
-from card.estimation.imu import ImuNoise, read_imu
+from card.estimation.imu import ImuNoise
 from card.estimation.odometry import plane_settings
 from card.geometry import Trajectory, inverse, quaternion_from_matrix
 from card.poses.anchor import anchor
-from card.poses.estimate_odometry import open_scans
 from card.poses.graph_tables import figures_of, loop_columns, node_columns, sigma_of
+from card.poses.inputs import open_imu, open_scans
 from card.poses.loops import LoopVerifier
 from card.poses.refine import local_constraints, refine
 from card.poses.sweep_store import SweepStore, along_nodes
@@ -53,7 +53,7 @@ def refine_odometry(
         ``pose_graph_nodes``, ``loops``, g2o's text format, and ``report``.
     odometry_settings : those that the odometry was made with.
     """
-    imu = read_imu(read_table(imu_path(recording), "imu"))
+    imu = open_imu(recording, calibration)
     table = read_table(odometry, "odometry_states")
     start, information, registered = _read_odometry(table)
     scans = open_scans(recording, bursts, calibration, odometry_settings)

@@ -9,7 +9,16 @@ from numpy.typing import NDArray
 
 from card.errors import CardError
 from card.geometry import CameraModel, matrix_from_quaternion, to_json
-from card.simulation.rig import CAMERAS, CHANNELS, WHEELS, LidarCorrections, Rig, built_rig, nominal_rig
+from card.simulation.rig import (
+    CAMERAS,
+    CHANNELS,
+    WHEELS,
+    ImuUnit,
+    LidarCorrections,
+    Rig,
+    built_rig,
+    nominal_rig,
+)
 from card.simulation.scales import scale_named
 
 Array = NDArray[np.float64]
@@ -33,6 +42,9 @@ _DISTORTION = (3e-4, 3e-4, 2e-5, 2e-5, 1e-4)
 _WHEEL_M = 1.5e-3
 _RANGE_M = 5e-4
 _CHANNEL_RANGE_M, _CHANNEL_RAD = 1e-3, np.radians(0.005)
+# A minute's drive turns a car about its z, and hardly tells more of the accelerometer than its maker.
+_GYRO = 1e-4 * np.array([[2.0, 3.7, 1.0], [0.0, 4.9, 2.1], [0.0, 0.0, 0.6]])
+_ACCEL = 1e-4 * np.array([[1.3, 2.8, 4.8], [0.0, 3.8, 4.9], [0.0, 0.0, 7.0]])
 
 
 def day_of(session: str) -> tuple[str, str]:
@@ -75,7 +87,8 @@ def session_rig(session: str, seed: int, scale: str) -> Rig:
 def true_calibration(session: str, seed: int, scale: str) -> dict[str, Any]:
     """The true calibration of a session, a document of schema ``calibration``.
 
-    ``lidar_corrections`` are what has to be added to what a LiDAR measures.
+    ``lidar_corrections`` are what has to be added to what a LiDAR measures, ``imu_corrections`` undo what
+    the IMU makes of the truth.
     """
     rig = session_rig(session, seed, scale)
     quality = {"stereo_reprojection_px": 0.0, "board_plane_rms_m": 0.0, "views": 0}
@@ -87,7 +100,7 @@ def delivered_calibration(session: str, seed: int, scale: str, views: int) -> di
 
     Cameras, front and rear LiDAR err together by 0.01 degrees and 1 mm against the rig; the right camera
     errs against the left by 0.003 degrees and 0.3 mm; the covariances say so. A LiDAR's channels are known
-    to 1 mm and 0.005 degrees.
+    to 1 mm and 0.005 degrees, the IMU as well as a session's drive tells.
     """
     day, _ = day_of(session)
     rig = session_rig(session, seed, scale)
@@ -107,6 +120,7 @@ def delivered_calibration(session: str, seed: int, scale: str, views: int) -> di
         wheel_center_m={w: xyz + wheel_rng.normal(0, _WHEEL_M, 3) for w, xyz in rig.wheel_center_m.items()},
         wheel_contact_m={w: xyz + wheel_rng.normal(0, _WHEEL_M, 3) for w, xyz in rig.wheel_contact_m.items()},
         lidar_corrections={name: _estimated_lidar(c, wheel_rng) for name, c in rig.lidar_corrections.items()},
+        imu=_estimated_imu(rig.imu, _rng(seed, session, 4)),
     )
     covariance = np.diag([_POSITION_M**2] * 3 + [_ANGLE_RAD**2] * 3)
     stereo = np.diag([_STEREO_M**2] * 3 + [_STEREO_ANGLE_RAD**2] * 3)
@@ -140,6 +154,10 @@ def _document(session: str, rig: Rig, covariances: dict[str, Any], quality: dict
             for w in WHEELS
         },
         "lidar_corrections": {name: _corrections(c) for name, c in rig.lidar_corrections.items()},
+        "imu_corrections": {
+            "gyro": np.triu(np.linalg.inv(rig.imu.gyro)).tolist(),
+            "accel": np.triu(np.linalg.inv(rig.imu.accel)).tolist(),
+        },
         "covariances": covariances,
         "quality": quality,
     }
@@ -187,6 +205,10 @@ def _estimated_lidar(true: LidarCorrections, rng: np.random.Generator) -> LidarC
         true.channel_elevation_offset_rad + rng.normal(0, _CHANNEL_RAD, CHANNELS),
         true.channel_azimuth_offset_rad + rng.normal(0, _CHANNEL_RAD, CHANNELS),
     )
+
+
+def _estimated_imu(true: ImuUnit, rng: np.random.Generator) -> ImuUnit:
+    return ImuUnit(true.gyro + _GYRO * rng.normal(size=(3, 3)), true.accel + _ACCEL * rng.normal(size=(3, 3)))
 
 
 def _cross(v: Array) -> Array:

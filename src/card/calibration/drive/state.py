@@ -112,7 +112,7 @@ class State:
 
     def trajectory(self, imu: Imu, gravity_m_s2: float) -> Trajectory:
         """The rig at the IMU's times from the first knot to the last: integrated, bent to meet the knots."""
-        true = Imu(imu.t_ns, imu.gyro @ self.gyro_matrix.T, imu.accel @ self.accel_matrix.T)
+        true = imu.corrected(self.gyro_matrix, self.accel_matrix)
         gravity = np.array([0.0, 0.0, -gravity_m_s2])
         nodes = Nodes(self.t_ns, self.poses, self.velocities, self.gyro_biases, self.accel_biases, gravity)
         return dense_trajectory(nodes, true, 0.0)
