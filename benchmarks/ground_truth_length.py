@@ -22,6 +22,7 @@ from full_scale import FullScale, open_drive
 from numpy.typing import NDArray
 
 from card.artifacts import atomic_folder, progress
+from card.ground_truth.aggregate import BLOCK_FRAMES
 from card.ground_truth.coverage import frame_window
 from card.ground_truth.frame import build_frame
 from card.ground_truth.hpr.workspace import Workspace
@@ -33,7 +34,7 @@ from card.ground_truth.voxels import VoxelGrid
 LAP_NS = 60_000_000_000
 #: From one lap to the next, metres: beyond the reach of the LiDARs.
 SHIFT_M = np.array([0.0, 1500.03, 0.0])
-FRAMES, BLOCK = 80, 40
+FRAMES = 200
 
 
 class Laps:
@@ -103,8 +104,8 @@ def _make_frames(scene: FullScale, drive: Laps, static: StaticSet) -> None:
     middle = int(drive.start_ns[0]) + (len(drive) // len(drive._own)) * LAP_NS // 2
     window = StaticWindow(drive, static, scene.camera, scene.settings)
     workspace = Workspace()
-    for start in range(0, FRAMES, BLOCK):
-        times = [middle + k * 100_000_000 for k in range(start, start + BLOCK)]
+    for start in range(0, FRAMES, BLOCK_FRAMES):
+        times = [middle + k * 100_000_000 for k in range(start, start + BLOCK_FRAMES)]
         windows = [frame_window(drive, t_ns, True, scene.settings).bursts for t_ns in times]
         window.open(np.unique(np.concatenate(windows)))
         for t_ns, bursts in zip(times, windows, strict=True):

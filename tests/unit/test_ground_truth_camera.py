@@ -63,6 +63,27 @@ def test_raster_order_and_clip_to_the_original_image(camera):
     assert np.abs(camera.image.project(points[index]) - pixels).max() <= 0.5
 
 
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize(
+    "distortion",
+    [(0.0,) * 5, (-0.1, 0.0, 0.0, 0.0, 0.0), (0.08, -0.03, 0.002, -0.003, 0.01), (-0.06, 0.01, 0.004, 0, 0)],
+)
+def test_compiled_pixels_are_those_of_the_camera_model(tmp_path, seed, distortion):
+    document = calibration()
+    document["cameras"]["camera_left"]["distortion"] = list(distortion)
+    write_mask(tmp_path / "mask.png")
+    camera = LeftCamera(document, tmp_path / "mask.png")
+    rng = np.random.default_rng(seed)
+    points = rng.uniform((-3, -3, -0.2), (3, 3, 3), (2000, 3))
+    # Some exactly on an axis, some in the plane of the camera, some at its centre.
+    points[:300, 0], points[200:400, 1], points[350:450, 2] = 0.0, 0.0, 0.0
+    index, pixels = camera.raster(points)
+    plain = camera.image.project(points)
+    inside = camera.image.contains(plain) & camera.in_view(points, 0.0, 0.0)
+    assert np.array_equal(np.sort(index), np.flatnonzero(inside))
+    assert np.array_equal(pixels, np.rint(plain[index]))
+
+
 def test_distortion_that_folds_back_brings_nothing_onto_the_image(tmp_path):
     document = calibration()
     document["cameras"]["camera_left"]["distortion"] = [-0.1, 0.0, 0.0, 0.0, 0.0]

@@ -36,7 +36,7 @@ from card.ground_truth.sweeps import Drive
 from card.ground_truth.voxels import unpack
 
 #: Frames whose bursts are ordered by voxel at once: more take more memory, fewer more time.
-BLOCK_FRAMES = 40
+BLOCK_FRAMES = 100
 #: World points that each process keeps meanwhile: a burst that enters the windows is a keyframe 13 s later.
 FRAME_POINTS = 16_000_000
 

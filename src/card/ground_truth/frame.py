@@ -68,7 +68,7 @@ def build_frame(
     first, second, of_key = two_pass_visibility(
         points, selection.of_keyframe, key, selection.diameter, settings, workspace
     )
-    visible = np.concatenate([points[second], key[of_key]])
+    visible = np.concatenate([np.take(points, second, axis=0), key[of_key]])
 
     step = settings["resolution_m"]
     visible = np.rint(visible / step) * step
@@ -85,6 +85,8 @@ def build_frame(
         "points_pass_2": len(visible) + rejected,
         "points_saved": len(on_image),
     }
-    different = int(np.count_nonzero(np.diff(pixels, axis=0).any(axis=1))) + min(len(pixels), 1)
+    pixel = pixels[:, 1] * camera.image.width + pixels[:, 0]
+    different = int(np.count_nonzero(pixel[1:] != pixel[:-1])) + min(len(pixel), 1)
     ordered = {name: counts[name] for name in STEPS}
-    return Frame(visible[on_image].astype(np.float32), different, ordered, rejected)
+    saved = np.take(visible, on_image, axis=0).astype(np.float32)
+    return Frame(saved, different, ordered, rejected)

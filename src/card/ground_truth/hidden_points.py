@@ -42,13 +42,14 @@ def two_pass_visibility(
         # At a sequence's end hardly anything may be static; then the keyframe and the viewer count too.
         D = diagonal(np.concatenate([static, keyframe, np.zeros((1, 3))]))
     passes = settings["hidden_point_removal"]
-    first = np.arange(len(static))
     if passes == "two_pass":
         first = visible_points(static, settings["hpr_first"] * D, workspace)
+    else:
+        first = np.arange(len(static))
     again = first[~is_keyframe[first]]
-    both = np.concatenate([static[again], keyframe])
     if passes == "off":
         return first, again, np.arange(len(keyframe))
+    both = np.concatenate([np.take(static, again, axis=0), keyframe])
     radius = settings["hpr_second" if passes == "two_pass" else "hpr_first"] * D
     second = visible_points(both, radius, workspace, mostly_visible=passes == "two_pass")
     return first, again[second[second < len(again)]], second[second >= len(again)] - len(again)

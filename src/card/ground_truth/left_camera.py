@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from card.artifacts.masks import read_ego_mask
 from card.geometry import CameraModel, from_json
+from card.ground_truth.image_pixels import Image, on_image
 from card.ground_truth.raster_order import raster_order
 
 Points = npt.NDArray[np.float64]
@@ -21,7 +22,7 @@ class LeftCamera:
     """The left camera of a calibration.
 
     image: the original, distorted image. undistorted: the image the ego mask belongs to.
-    ego: (H, W) bool, where the car itself is on the undistorted image.
+    ego: (H, W) bool, where the car itself is on the undistorted image; from row `ego_top` on, H for none.
     rig_from_camera: (4, 4).
     """
 
@@ -30,6 +31,7 @@ class LeftCamera:
         self.undistorted = CameraModel.from_json(calibration["camera_left_undistorted"])
         self.rig_from_camera = from_json(calibration["extrinsics"]["rig_from_camera_left"])
         self.ego = read_ego_mask(ego_mask, self.undistorted.width, self.undistorted.height) == 255
+        self.ego_top = int(np.argmax(np.append(self.ego.any(axis=1), True)))
         border = self.image.rays(_border(self.image.width, self.image.height))[:, :2]
         self._low, self._high = border.min(axis=0), border.max(axis=0)
 
@@ -71,11 +73,10 @@ class LeftCamera:
         Pixels are (column, row), rounded. Beyond the image the distortion may fold back onto it: only
         points within the image's own field of view count.
         """
-        pixels = self.image.project(points)
-        on = np.flatnonzero(self.image.contains(pixels) & self.in_view(points, 0.0, 0.0))
-        column, row = np.ascontiguousarray(np.rint(pixels[on]).astype(np.int64).T)
-        order = raster_order(points[on], column, row)
-        return on[order], np.stack([column, row], axis=1)[order]
+        found = np.empty((3, len(points)), dtype=np.int64)
+        found = found[:, : on_image(points, Image.of(self.image, *self.bounds(0.0)), *found)]
+        order = raster_order(np.take(points, found[0], axis=0), found[1], found[2])
+        return found[0, order], found[1:, order].T
 
 
 def _border(width: int, height: int) -> Points:

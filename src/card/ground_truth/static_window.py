@@ -165,6 +165,7 @@ class StaticWindow:
             cx=image.cx,
             cy=image.cy,
             ego=self._camera.ego,
+            ego_top=self._camera.ego_top,
         )
 
     def _sensor(self, i: int) -> int:

@@ -39,7 +39,8 @@ class View(NamedTuple):
     """The camera at one instant.
 
     rotation: (3, 3), translation: (3,) of camera_from_world. low, high: (2,) bounds of x/z and y/z.
-    nearest: smallest z, metres. fx, fy, cx, cy: of the undistorted image. ego: its mask, (H, W) bool.
+    nearest: smallest z, metres. fx, fy, cx, cy: of the undistorted image. ego: its mask, (H, W) bool, which
+    begins at row `ego_top`.
     """
 
     rotation: npt.NDArray[np.float64]
@@ -52,6 +53,7 @@ class View(NamedTuple):
     cx: float
     cy: float
     ego: npt.NDArray[np.bool_]
+    ego_top: int
 
 
 @compiled
@@ -260,9 +262,11 @@ def emit(rows: Rows, near: Any, view: View, keyframe: int, points: Any, own: Any
                 if y < view.low[1] * z or y > view.high[1] * z:
                     continue
                 in_view += 1
-                column = int(min(max(np.rint(x / z * view.fx + view.cx), 0), columns_ego - 1))
-                line = int(min(max(np.rint(y / z * view.fy + view.cy), 0), rows_ego - 1))
                 points[count, 0], points[count, 1], points[count, 2] = x, y, z
                 own[count] = rows.burst[at] == keyframe
-                count += not view.ego[line, column]
+                line = int(min(max(np.rint(y / z * view.fy + view.cy), 0), rows_ego - 1))
+                if line >= view.ego_top:
+                    column = int(min(max(np.rint(x / z * view.fx + view.cx), 0), columns_ego - 1))
+                    count -= view.ego[line, column]
+                count += 1
     return in_view, count
