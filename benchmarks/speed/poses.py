@@ -19,6 +19,7 @@ from card.recording.paths import list_bursts
 
 DRIVE, SEED, SECONDS = "it_town_revisit", 1, 60.0  # two rounds of 220 m
 LIDAR = "lidar_front"
+ROOT = Path(__file__).resolve().parents[1]
 #: The drive of ten minutes has a tenth of the columns: what grows with it are the nodes and the map.
 LONG_S, LONG_COLUMNS = 600.0, 200
 
@@ -89,14 +90,20 @@ def _shared(folder: Path, scratch: Path, bursts: Path | None) -> dict[str, Any]:
 
 def peak_gb(scratch: Path, seconds: float = LONG_S) -> float:
     """Greatest memory of a process that takes a drive of many rounds through both stages, GB."""
-    command = [sys.executable, __file__, str(scratch / "long"), str(seconds)]
-    result = subprocess.run(command, check=True, capture_output=True, text=True)
+    result = subprocess.run(
+        _command(scratch / "long", seconds), cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True
+    )
     return float(json.loads(result.stdout.splitlines()[-1]))
+
+
+def _command(folder: Path, seconds: float, *action: str) -> list[str]:
+    """This module in a process of its own; as a script it would hide other packages behind its neighbours."""
+    return [sys.executable, "-m", "speed.poses", str(folder), str(seconds), *action]
 
 
 def long_drive(folder: Path, seconds: float) -> None:
     """Simulate a long drive in a process of its own, and take it through both stages."""
-    subprocess.run([sys.executable, __file__, str(folder), str(seconds), "simulate"], check=True)
+    subprocess.run(_command(folder, seconds, "simulate"), cwd=ROOT, check=True)
     write_bursts_table(folder, folder)
     odometry(folder, folder)
     batch(folder, folder)

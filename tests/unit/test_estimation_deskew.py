@@ -7,7 +7,8 @@ from hypothesis.extra.numpy import arrays
 from hypothesis.strategies import DataObject, booleans, data, floats, integers, sampled_from
 
 from card.errors import CardError
-from card.estimation.deskew import deskew_burst, deskew_plain
+from card.estimation.deskew import deskew_burst, deskew_plain, turns_of
+from card.estimation.deskew_kernel import corrected
 from card.geometry import Trajectory, apply, transform
 from card.geometry.corrections import correct_points
 from card.recording.burst import Burst
@@ -32,6 +33,9 @@ def burst(count: int = 50) -> Burst:
     return Burst(START_NS + 200_000_000, rng.normal(0, 10, (count, 3)), grey, grey, offset)
 
 
+channel_offsets = arrays(np.float64, 32, elements=floats(-0.05, 0.05))
+
+
 def polar(r: float, azimuth_deg: float, elevation_deg: float) -> list[float]:
     """Azimuth from y towards x: clockwise seen from above."""
     az, el = np.radians([azimuth_deg, elevation_deg])
@@ -45,9 +49,21 @@ def test_corrections_are_added_to_what_was_measured() -> None:
     corrections["channel_elevation_offset_rad"][5] = np.radians(0.2)
     corrections["channel_azimuth_offset_rad"][6] = np.radians(0.5)
     measured = np.array([polar(10, 170, -9), polar(20, -60, 3), polar(30, 40, -16), polar(40, 90, 15)])
-    corrected = correct_points(measured, np.array([3, 4, 5, 6], dtype=np.uint8), corrections)
+    found = correct_points(measured, np.array([3, 4, 5, 6], dtype=np.uint8), corrections)
     wanted = [polar(10.03, 170, -9), polar(20.02, -60, 3), polar(30.03, 40, -15.8), polar(40.03, 90.5, 15)]
-    np.testing.assert_allclose(corrected, wanted, atol=1e-12)
+    np.testing.assert_allclose(found, wanted, atol=1e-12)
+
+
+@settings(max_examples=20, deadline=None)
+@given(data())
+def test_the_compiled_corrections_are_the_plain_ones(draw: DataObject) -> None:
+    rng = np.random.default_rng(draw.draw(integers(0, 2**32 - 1)))
+    names = ("range_offset_m", "elevation_offset_rad", "azimuth_offset_rad")
+    corrections = {f"channel_{name}": draw.draw(channel_offsets) for name in names} | {"range_offset_m": 0.02}
+    points, ring = rng.normal(0, 10, (40, 3)), rng.integers(0, 32, 40).astype(np.uint8)
+    points[0], points[1, :2] = 0.0, 0.0
+    plain = correct_points(points, ring, corrections)
+    np.testing.assert_allclose(corrected(points, ring, turns_of(corrections)), plain, atol=1e-12)
 
 
 def test_each_point_takes_the_pose_of_its_own_time() -> None:
@@ -80,9 +96,6 @@ def test_a_burst_that_ends_after_the_poses_is_refused_whatever_end_is_given() ->
     short = Trajectory(path.t_ns[:25], path.translation_m[:25], path.rotation_wxyz[:25])
     with pytest.raises(CardError, match="poses do not cover the burst"):
         deskew_burst(late, RIG_FROM_LIDAR, short, end_ns=late.t_ns)
-
-
-channel_offsets = arrays(np.float64, 32, elements=floats(-0.05, 0.05))
 
 
 @settings(max_examples=60, deadline=None)

@@ -59,7 +59,7 @@ def deskew_burst(
             np.ascontiguousarray(burst.points),
             burst.ring,
             burst.offset_ns,
-            _turns(corrections),
+            turns_of(corrections),
             np.ascontiguousarray(rig_from_lidar),
             trajectory.t_ns[knots] - burst.t_ns,
             trajectory.translation_m[knots],
@@ -85,7 +85,7 @@ def _in_rig(
     return apply(rig_from_lidar, points)
 
 
-def _turns(corrections: Mapping[str, Any] | None) -> NDArray[np.float64]:
+def turns_of(corrections: Mapping[str, Any] | None) -> NDArray[np.float64]:
     """(32, 5) a channel: offset of the range, cosine and sine of the offsets of elevation and azimuth."""
     if corrections is None:
         return np.tile([0.0, 1.0, 0.0, 1.0, 0.0], (CHANNELS, 1))

@@ -34,15 +34,7 @@ def place(
     angle, sine, step = 0.0, 1.0, 1.0
     q, t = np.zeros(4), np.zeros(3)
     for n in range(len(points)):
-        x, y, z = points[n, 0], points[n, 1], points[n, 2]
-        offset, cos_up, sin_up, cos_az, sin_az = turns[ring[n]]
-        flat = np.sqrt(x * x + y * y)
-        distance = np.sqrt(flat * flat + z * z)
-        scale = 1.0 + offset / distance if distance > 0 else 1.0
-        stretch = scale * (cos_up - sin_up * z / flat) if flat > 0 else scale * cos_up
-        p0 = stretch * (x * cos_az + y * sin_az)
-        p1 = stretch * (y * cos_az - x * sin_az)
-        p2 = scale * (z * cos_up + flat * sin_up)
+        p0, p1, p2 = _corrected(points[n, 0], points[n, 1], points[n, 2], turns[ring[n]])
         r0 = _row(rig_from_lidar[0], p0, p1, p2)
         r1 = _row(rig_from_lidar[1], p0, p1, p2)
         r2 = _row(rig_from_lidar[2], p0, p1, p2)
@@ -77,6 +69,31 @@ def place(
         world[n, 1] = r1 + double * (d * u0 - b * u2) + t[1]
         world[n, 2] = r2 + double * (b * u1 - c * u0) + t[2]
     return world
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def corrected(points: Array, ring: NDArray[np.uint8], turns: Array) -> Array:
+    """Corrected points (N, 3) in the sensor frame of raw ones, as `correct_points` has them."""
+    result = np.empty((len(points), 3))
+    for n in range(len(points)):
+        result[n, 0], result[n, 1], result[n, 2] = _corrected(
+            points[n, 0], points[n, 1], points[n, 2], turns[ring[n]]
+        )
+    return result
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _corrected(x: float, y: float, z: float, turn: Array) -> tuple[float, float, float]:
+    offset, cos_up, sin_up, cos_az, sin_az = turn
+    flat = np.sqrt(x * x + y * y)
+    distance = np.sqrt(flat * flat + z * z)
+    scale = 1.0 + offset / distance if distance > 0 else 1.0
+    stretch = scale * (cos_up - sin_up * z / flat) if flat > 0 else scale * cos_up
+    return (
+        stretch * (x * cos_az + y * sin_az),
+        stretch * (y * cos_az - x * sin_az),
+        scale * (z * cos_up + flat * sin_up),
+    )
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")

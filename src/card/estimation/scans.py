@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from card.errors import CardError
+from card.estimation.deskew import turns_of
+from card.estimation.deskew_kernel import corrected
 from card.estimation.motion_compensation import compensate
 from card.estimation.strapdown import Path as ImuPath
 from card.geometry import apply, from_json, inverse
-from card.geometry.corrections import correct_points
 from card.recording.laz import read_burst
 
 Array = NDArray[np.float64]
@@ -106,7 +107,7 @@ class Scans:
         files = bursts["file"].to_pylist()
         self._files = [recording / files[i] for i in order]
         self._rig_from = {name: from_json(calibration["extrinsics"][f"rig_from_{name}"]) for name in lidars}
-        self._corrections = {name: calibration["lidar_corrections"].get(name) for name in lidars}
+        self._turns = {name: turns_of(calibration["lidar_corrections"].get(name)) for name in lidars}
         self._compensated = {name: bool(sensors.get(name, {}).get("deskewed", False)) for name in lidars}
         self._limits = limits
 
@@ -134,10 +135,7 @@ class Scans:
                 found=f"{len(burst)} points of one time",
                 wanted="offset_ns a point, or deskewed: true in recording.yaml",
             )
-        corrections = self._corrections[name]
-        points = (
-            burst.points if corrections is None else correct_points(burst.points, burst.ring, corrections)
-        )
+        points = np.asarray(corrected(burst.points, burst.ring, self._turns[name]))
         kept = self._limits.keep(points)
         in_rig = apply(self._rig_from[name], points[kept])
         return Scan(burst.t_ns, int(self.end_ns[i]), in_rig, burst.time_ns[kept], self._compensated[name])

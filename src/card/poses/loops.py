@@ -46,6 +46,15 @@ def travelled(poses: Array) -> Array:
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
+def spaced(way: Array, spacing_m: float) -> NDArray[np.intp]:
+    """Nodes (M,) from the first on that are at least so far apart along their way (N,)."""
+    chosen = [0]
+    for k in range(1, len(way)):
+        if way[k] - way[chosen[-1]] >= spacing_m:
+            chosen.append(k)
+    return np.array(chosen, dtype=np.intp)
+
+
 def candidates(poses: Array, spacing_m: float, radius_m: float, min_way_m: float) -> list[tuple[int, int]]:
     """Pairs (earlier, later) of poses (N, 4, 4) that lie within a radius, the later ones `spacing_m` apart.
 
@@ -118,15 +127,14 @@ class LoopVerifier:
     def _map_around(self, poses: Array, first: int) -> PlaneMap:
         """Planes of the sweeps within reach along the way, in the first node's frame."""
         if self._map is None or self._map[0] != first:
-            way, spacing = travelled(poses), self._settings["loop_map_spacing_m"]
+            way = travelled(poses)
             # Nothing of the later visit may get into the map of the earlier one.
             reach = min(self._settings["loop_map_m"], self._settings["loop_min_way_m"] / 2)
             grid = PlaneMap(self._planes)
-            last = -np.inf
-            for k in np.flatnonzero(np.abs(way - way[first]) <= reach):
-                if way[k] - last >= spacing or k == first:
-                    last = way[k]
-                    relative = inverse(poses[first]) @ poses[k]
-                    grid.insert(apply(relative, self._store.points(int(k))))
+            # The same sweeps for the maps of all loops: most of the work is to read them.
+            chosen = spaced(way, self._settings["loop_map_spacing_m"])
+            for k in chosen[np.abs(way[chosen] - way[first]) <= reach]:
+                relative = inverse(poses[first]) @ poses[k]
+                grid.insert(apply(relative, self._store.points(int(k))))
             self._map = first, grid
         return self._map[1]

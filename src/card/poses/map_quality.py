@@ -12,7 +12,7 @@ from card.estimation.plane_kernels import voxel_means
 from card.estimation.plane_map import PlaneMap, PlaneSettings
 from card.estimation.scans import Limits, Scans
 from card.geometry import Trajectory, apply
-from card.poses.loops import candidates, travelled
+from card.poses.loops import candidates, spaced, travelled
 from card.poses.sweep_store import SweepStore, along_trajectory
 
 Array = NDArray[np.float64]
@@ -38,7 +38,7 @@ def map_figures(
         near, far = settings["quality_range_m"]
         scans = Scans(recording, bursts, calibration, sensors, [LIDAR], Limits(near, far, (-180.0, 180.0)))
         poses = trajectory.at(scans.end_ns)
-        chosen = _spaced(travelled(poses), settings["quality_spacing_m"])
+        chosen = spaced(travelled(poses), settings["quality_spacing_m"])
         store = SweepStore(scans, chosen, along_trajectory(trajectory), POINTS_LEAF_M)
         poses = poses[chosen]
         thickness = _thickness(store, poses)
@@ -70,14 +70,6 @@ def map_figures(
             "the same, greatest",
         ),
     ]
-
-
-def _spaced(way: Array, spacing_m: float) -> NDArray[np.intp]:
-    chosen = [0]
-    for k in range(1, len(way)):
-        if way[k] - way[chosen[-1]] >= spacing_m:
-            chosen.append(k)
-    return np.array(chosen, dtype=np.intp)
 
 
 def _thickness(store: SweepStore, poses: Array) -> float | None:

@@ -22,7 +22,7 @@ class SweepStore:
     """Points of sweeps in the rig at each sweep's end; the latest `size` of them stay in memory."""
 
     def __init__(
-        self, scans: Scans, sweep_of: NDArray[np.intp], motion: Motion, leaf_m: float, size: int = 128
+        self, scans: Scans, sweep_of: NDArray[np.intp], motion: Motion, leaf_m: float, size: int = 256
     ) -> None:
         """sweep_of (N,) : ordinals of the sweeps that are numbered from 0 here."""
         self._scans, self._sweep_of, self._motion = scans, sweep_of, motion
