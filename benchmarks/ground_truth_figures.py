@@ -21,8 +21,16 @@ from card.ground_truth.static_window import StaticWindow
 
 SINGLE = {"front_votes_min": 1, "front_votes_max": 1, "rear_votes_min": 1, "rear_votes_max": 1}
 FIXED = SINGLE | {"front_votes_min": 2, "front_votes_max": 2}
-#: Settings that leave out, at 0, what removes movers beside the share of moved votes.
-NEXT_TO_VOTES = ("vacated_votes", "brief_looks", "passes_per_hit", "attached_voxels", "surrounded_share")
+#: Settings that leave out, at 0, what decides on movers beside the share of moved votes.
+NEXT_TO_VOTES = (
+    "moved_fraction_lone",
+    "vacated_votes",
+    "brief_looks",
+    "passes_per_hit",
+    "attached_voxels",
+    "surrounded_share",
+    "accompanied_voxels",
+)
 #: The steps of the paper's ablation figure and tables that decide on voxels, as changes of the defaults.
 ABLATION: Mapping[str, Mapping[str, Any]] = {
     "single_no_crop": {"flow_method": "off", "front_crop": "none", **SINGLE},

@@ -6,9 +6,11 @@ from hypothesis import strategies as st
 
 from card.artifacts import default_settings
 from card.ground_truth.dynamic_voxels import (
+    accompanied,
     attached,
     contradicted,
     is_brief,
+    lone,
     looked_through,
     seldom_hit,
     surrounded,
@@ -37,9 +39,46 @@ def test_contradiction_may_be_larger_where_quotas_are_met():
 
 
 def test_a_voxel_is_seldom_hit_if_most_sweeps_look_past_it():
-    some = votes(hits=[1, 1, 1, 2, 0], beside=[11, 12, 10, 12, 11], moved=[1, 0, 1, 1, 1])
+    some = votes(hits=[1, 1, 1, 2, 0], beside=[6, 7, 5, 13, 6], moved=[2, 1, 2, 2, 2])
     assert seldom_hit(some, SETTINGS).tolist() == [True, False, False, False, True]
     assert not seldom_hit(some, SETTINGS | {"passes_per_hit": 0}).any()
+
+
+def test_a_lone_voxel_takes_more_contradiction():
+    keys = cube(50, 2)
+    some = votes(hits=[6] * 8, moved=[4] * 8)
+    few, many = np.arange(8) < 3, np.arange(8) < 4
+    assert lone(keys, few, some, SETTINGS).tolist() == few.tolist()
+    assert not lone(keys, many, some, SETTINGS).any()
+    assert not lone(keys, few, votes(hits=[6] * 8, moved=[5] * 8), SETTINGS).any()
+    assert not lone(keys, few, some, SETTINGS | {"moved_fraction_lone": 0}).any()
+
+
+def test_a_voxel_among_dynamic_ones_takes_less():
+    keys = cube(50, 3)
+    dynamic = np.arange(27) >= 15
+    some = votes(hits=[9] * 27, beside=[9, 8, 9] * 9, moved=[2, 2, 1] * 9)
+    found = accompanied(keys, dynamic, some, SETTINGS)
+    assert found.tolist() == [True, True, False] * 9
+    assert not accompanied(keys, np.arange(27) >= 16, some, SETTINGS).any()
+    assert not accompanied(keys, dynamic, some, SETTINGS | {"accompanied_voxels": 0}).any()
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.lists(st.tuples(*[st.integers(0, 6)] * 3, st.booleans()), max_size=80, unique_by=lambda v: v[:3]),
+    st.integers(0, 5),
+    st.sampled_from([1, 2]),
+)
+def test_company_is_counted_as_over_all_pairs(voxels, company, radius):
+    table = np.array(sorted(voxels), dtype=np.int64).reshape(-1, 4)
+    keys, dynamic = pack(table[:, :3] + 50), table[:, 3] > 0
+    close = np.abs(table[:, None, :3] - table[:, :3]).max(axis=2, initial=0) <= radius
+    count = (close & dynamic).sum(axis=1)
+    some = votes(hits=[8] * len(keys), moved=[2] * len(keys)) if len(keys) else votes(hits=[])
+    filled = SETTINGS | {"near_voxels": radius, "lone_voxels": company, "accompanied_voxels": company + 1}
+    assert np.array_equal(lone(keys, dynamic, some, filled), dynamic & (count - 1 <= company))
+    assert np.array_equal(accompanied(keys, dynamic, some, filled), count > company)
 
 
 def test_what_stood_for_long_and_is_gone_is_dynamic():
@@ -59,6 +98,12 @@ def test_a_brief_voxel_that_is_looked_through_at_other_times_is_dynamic():
     never_moved = votes(elsewhen=[9, 9, 9])
     assert not looked_through(never_moved, brief, SETTINGS).any()
     assert not looked_through(some, brief, SETTINGS | {"brief_looks": 0}).any()
+
+
+def cube(first: int, edge: int) -> np.ndarray:
+    """Keys of a solid cube of voxels."""
+    axis = np.arange(first, first + edge)
+    return pack(np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3))
 
 
 def row_of_voxels(dynamic: list[int], seconds: list[float]) -> tuple:

@@ -29,15 +29,42 @@ def contradicted(votes: Votes, quotas_met: Mask, settings: Mapping[str, Any]) ->
 
 
 def seldom_hit(votes: Votes, settings: Mapping[str, Any]) -> Mask:
-    """Voxels (C,) that rays pass `passes_per_hit` times as often as they hit them, and one of them moved.
+    """Voxels (C,) that rays pass `passes_per_hit` times as often as they hit them, V_dyn of them moved.
 
-    Beside what stands still (a walker under a tree) most passes have a return near.
+    Beside what stands still (a walker under a tree, a tyre on the road) most passes have a return near.
     """
     wanted = settings["passes_per_hit"]
     if not wanted:
         return np.zeros(len(votes.moved), dtype=np.bool_)
     seldom: Mask = votes.beside + votes.moved >= wanted * np.maximum(votes.hits, 1)
-    return seldom & (votes.moved >= 1)
+    return seldom & (votes.moved >= settings["moved_votes"])
+
+
+def lone(keys: Index, dynamic: Mask, votes: Votes, settings: Mapping[str, Any]) -> Mask:
+    """Dynamic voxels (C,) with `lone_voxels` or fewer others near and a moved share below eta_lone.
+
+    What moves is larger than a voxel or two; edges that rays brush past are not.
+
+    keys : (C,) increasing.
+    """
+    few = _near(keys, keys[dynamic], settings["near_voxels"]) - 1 <= settings["lone_voxels"]
+    share = votes.moved / np.maximum(votes.comparisons, 1)
+    return dynamic & few & (share < settings["moved_fraction_lone"])
+
+
+def accompanied(keys: Index, dynamic: Mask, votes: Votes, settings: Mapping[str, Any]) -> Mask:
+    """Voxels (C,) with `accompanied_voxels` dynamic ones near, V_dyn moved votes and a share of eta_near.
+
+    The underside of a car lies so low over the road that most rays that pass have a return near.
+
+    keys : (C,) increasing.
+    """
+    if not settings["accompanied_voxels"]:
+        return np.zeros(len(keys), dtype=np.bool_)
+    near = _near(keys, keys[dynamic], settings["near_voxels"]) >= settings["accompanied_voxels"]
+    share = votes.moved / np.maximum(votes.comparisons, 1)
+    accompanied: Mask = near & (votes.moved >= settings["moved_votes"])
+    return accompanied & (share >= settings["moved_fraction_near"])
 
 
 def vacated(votes: Votes, settings: Mapping[str, Any]) -> Mask:
@@ -116,16 +143,21 @@ def surrounded(keys: Index, dynamic: Mask, settings: Mapping[str, Any]) -> Mask:
     count = np.zeros(len(keys), dtype=np.int64)
     new = np.flatnonzero(dynamic)
     while len(new):
-        steps = np.zeros(len(keys) + 1, dtype=np.int64)
-        for low, high in _columns(keys, keys[new], radius):
-            np.add.at(steps, low, 1)
-            np.add.at(steps, high, -1)
-        count += np.cumsum(steps)[:-1]
+        count += _near(keys, keys[new], radius)
         near = np.flatnonzero(~dynamic & (count >= least))
         others = sum(high - low for low, high in _columns(keys, keys[near], radius)) - 1
         new = near[count[near] >= share * others]
         dynamic[new] = True
     return dynamic
+
+
+def _near(keys: Index, of: Index, radius: int) -> Index:
+    """How many of the voxels (N,) have each of `keys` (C,) in the cube of 2 radius + 1 round them."""
+    steps = np.zeros(len(keys) + 1, dtype=np.int64)
+    for low, high in _columns(keys, of, radius):
+        np.add.at(steps, low, 1)
+        np.add.at(steps, high, -1)
+    return np.cumsum(steps)[:-1]
 
 
 def _columns(keys: Index, of: Index, radius: int) -> Iterator[tuple[Index, Index]]:

@@ -11,9 +11,11 @@ import numpy.typing as npt
 
 from card.artifacts import progress
 from card.ground_truth.dynamic_voxels import (
+    accompanied,
     attached,
     contradicted,
     is_brief,
+    lone,
     looked_through,
     seldom_hit,
     surrounded,
@@ -89,21 +91,22 @@ def _dynamic_by_visibility(
     votes = visibility_votes(drive, progress(sweeps, "moved votes"), voxels, chosen, settings)
     hit = hit_times(drive, voxels, chosen)
     brief = is_brief(hit, settings)
-    dynamic, reasons = np.zeros(len(chosen), dtype=np.bool_), {}
-    for reason, found in (
-        ("contradicted", contradicted(votes, quotas_met, settings)),
-        ("vacated", vacated(votes, settings)),
-        ("looked_through", looked_through(votes, brief, settings)),
-        ("seldom_hit", seldom_hit(votes, settings)),
-    ):
+    keys, dynamic, reasons = voxels.keys[chosen], np.zeros(len(chosen), dtype=np.bool_), {}
+
+    def count(reason: str, found: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
         reasons[f"voxels_{reason}"] = int((found & ~dynamic).sum())
-        dynamic |= found
-    keys = voxels.keys[chosen]
-    joined = attached(keys, dynamic, brief, hit, settings)
-    whole = surrounded(keys, joined, settings)
-    reasons["voxels_attached"] = int((joined & ~dynamic).sum())
-    reasons["voxels_surrounded"] = int((whole & ~joined).sum())
-    return whole, reasons
+        return dynamic | found
+
+    doubtful = contradicted(votes, quotas_met, settings)
+    dynamic = count("vacated", vacated(votes, settings))
+    dynamic = count("looked_through", looked_through(votes, brief, settings))
+    dynamic = count("seldom_hit", seldom_hit(votes, settings))
+    spared = lone(keys, dynamic | doubtful, votes, settings)
+    dynamic = count("contradicted", doubtful & ~spared)
+    dynamic = count("attached", attached(keys, dynamic, brief, hit, settings))
+    dynamic = count("surrounded", surrounded(keys, dynamic, settings))
+    dynamic = count("accompanied", accompanied(keys, dynamic, votes, settings))
+    return dynamic, reasons
 
 
 def _stream(drive: Drive, why: dict[str, int]) -> Iterator[tuple[int, bool, npt.NDArray[np.float64]]]:
