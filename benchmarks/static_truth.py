@@ -59,12 +59,14 @@ def scores(voxels: VoxelMap, moving: NDArray[np.int64], static: NDArray[np.int64
     """Accuracies, %, over the voxels that both LiDARs hit, of a static set given by its keys.
 
     A voxel is dynamic if most of its points are. SA, DA: share of static voxels kept and of dynamic ones
-    removed. AA, HA: their geometric and harmonic mean. point_DA: share of the moving points removed.
+    removed. AA, HA: their geometric and harmonic mean. point_DA: share of all moving points of the drive
+    removed, by whatever test; point_DA_two_lidars: of those in voxels that both LiDARs hit.
     dynamic_pct: share of the points of kept voxels that move.
     """
     both = voxels.hit_by_both
-    kept = (find(static, voxels.keys) >= 0)[both]
-    moving, counts = moving[both], voxels.counts[both]
+    every = find(static, voxels.keys) >= 0
+    survive = moving[every].sum() / moving.sum()
+    kept, moving, counts = every[both], moving[both], voxels.counts[both]
     dynamic = 2 * moving > counts
     sa, da = 100 * kept[~dynamic].mean(), 100 * (~kept[dynamic]).mean()
     return {
@@ -72,7 +74,8 @@ def scores(voxels: VoxelMap, moving: NDArray[np.int64], static: NDArray[np.int64
         "DA": float(da),
         "AA": float(np.sqrt(sa * da)),
         "HA": float(2 * sa * da / (sa + da)),
-        "point_DA": float(100 * moving[~kept].sum() / moving.sum()),
+        "point_DA": float(100 * (1 - survive)),
+        "point_DA_two_lidars": float(100 * moving[~kept].sum() / moving.sum()),
         "dynamic_pct": float(100 * moving[kept].sum() / counts[kept].sum()),
     }
 

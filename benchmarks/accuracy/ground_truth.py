@@ -24,6 +24,7 @@ FIGURES: dict[str, tuple[float | None, str, str]] = {
     "AA": (None, "%", "higher"),
     "HA": (None, "%", "higher"),
     "point_DA": (99.0, "%", "higher"),
+    "point_DA_two_lidars": (None, "%", "higher"),
     "AA_dufomap": (None, "%", "higher"),
     "dynamic_pct": (None, "%", "lower"),
     "occluded_pct": (0.3, "%", "lower"),

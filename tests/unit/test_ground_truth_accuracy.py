@@ -34,7 +34,8 @@ def test_scores_of_a_static_set(measures):
     assert found["DA"] == pytest.approx(50)
     assert found["AA"] == pytest.approx(np.sqrt(75 * 50))
     assert found["HA"] == pytest.approx(60)
-    assert found["point_DA"] == pytest.approx(100 * 15 / 21)
+    assert found["point_DA"] == pytest.approx(100 * 15 / 31)
+    assert found["point_DA_two_lidars"] == pytest.approx(100 * 15 / 21)
 
 
 def test_errors_along_rays_of_a_wall(measures, tmp_path):
