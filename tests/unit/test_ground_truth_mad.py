@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from card.ground_truth.reference.mad import mad_inliers
-from card.ground_truth.reference.thinning import thin
+from card.ground_truth.reference.thinning import pixel_limit, thin
 
 
 def points_at_radii(radii: list[float]) -> np.ndarray:
@@ -51,7 +51,7 @@ def test_no_points():
 @pytest.mark.parametrize("limit", [1, 2, 3, 7])
 def test_thinning_keeps_the_limit_spread_over_each_voxel(limit):
     voxel = np.random.default_rng(0).integers(0, 30, 300).astype(np.int32)
-    kept = thin(voxel, limit)
+    kept = thin(voxel, np.full(30, limit))
     for v in range(30):
         own = kept[voxel == v]
         assert own.sum() == min(limit, len(own))
@@ -59,5 +59,13 @@ def test_thinning_keeps_the_limit_spread_over_each_voxel(limit):
         assert len(gaps) == 0 or gaps.max() - gaps.min() <= 1
 
 
-def test_a_limit_of_zero_keeps_all():
-    assert thin(np.zeros(9, np.int32), 0).all()
+def test_each_voxel_has_a_limit_of_its_own():
+    voxel = np.repeat([2, 0, 1], [9, 9, 2]).astype(np.int32)
+    kept = thin(voxel, np.array([1, 5, 4]))
+    assert [int(kept[voxel == v].sum()) for v in range(3)] == [1, 2, 4]
+
+
+def test_a_voxel_keeps_a_point_for_so_many_pixels_that_it_covers():
+    # 10 cm at 10 m and a focal length of 1600 pixels: 16 by 16 of them.
+    depths = np.array([10.0, 20.0, 40.0, 500.0])
+    assert pixel_limit(depths, 0.1, 1600.0, 2.0).tolist() == [128, 32, 8, 1]

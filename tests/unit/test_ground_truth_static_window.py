@@ -100,6 +100,7 @@ def path(origin, frames, speed):
         {
             "mad_form": st.sampled_from(["deviation", "literal", "off"]),
             "points_per_voxel": st.sampled_from([0, 1, 3]),
+            "pixels_per_point": st.sampled_from([0, 0.7, 2.5, 40]),
             "min_lidars_per_voxel": st.sampled_from([1, 2]),
             "mad_min_inliers": st.sampled_from([1, 2, 5]),
         }
@@ -121,7 +122,7 @@ def test_same_points_as_plain_numpy(camera, seed, origin, speed, lidars, front, 
 @pytest.mark.parametrize("origin", ORIGINS)
 def test_a_drive_through_the_scene_keeps_points(camera, origin):
     drive = Bursts(7, origin, (True, False), noise=0.01)
-    options = default_settings("ground_truth")
+    options = default_settings("ground_truth") | {"pixels_per_point": 0}
     sizes = compare(
         drive,
         static_of(drive, origin, 7),

@@ -81,6 +81,7 @@ class StaticWindow:
             kept=take("row kept", points, np.bool_),
             changed=np.ones(len(self._found), dtype=np.bool_),
             clean=np.zeros(len(self._found), dtype=np.int64),
+            left=np.zeros(len(self._found), dtype=np.int64),
             corner=self._static.grid.corners(self._static.keys[self._found]),
         )
         end = start[:-1].copy()
@@ -107,7 +108,7 @@ class StaticWindow:
         )
         near = near[:listed]
         most = int((rows.start[2::2] - rows.start[:-2:2]).max(initial=0))
-        inliers, thinned = kernels.clean(
+        inliers, most_points = kernels.clean(
             rows,
             near,
             settings["mad_multiplier"],
@@ -119,9 +120,12 @@ class StaticWindow:
             take("radius", most, np.float32),
             take("sorted", most, np.float32),
         )
-        points = take("points", (thinned + 1, 3), np.float64)
-        own = take("own", thinned + 1, np.bool_)
-        in_view, count = kernels.emit(rows, near, view, keyframe_burst, points, own)
+        points = take("points", (most_points + 1, 3), np.float64)
+        own = take("own", most_points + 1, np.bool_)
+        size, pixels_per_point = self._static.grid.size, float(settings["pixels_per_point"])
+        thinned, in_view, count = kernels.emit(
+            rows, near, view, size, pixels_per_point, keyframe_burst, points, own
+        )
         counts = {
             "points_window": sum(self._bursts[int(i)].total for i in bursts),
             "points_static": sum(len(self._bursts[int(i)].voxel) for i in bursts),

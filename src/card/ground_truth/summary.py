@@ -18,7 +18,7 @@ _REASONS = {
     "points_two_lidars": "in voxels that only one LiDAR hit in the frame's windows",
     "points_near_view": "in voxels out of the camera's view",
     "points_clean": "outliers of their voxel (MAD)",
-    "points_thinned": "beyond the limit of points a voxel",
+    "points_thinned": "beyond the limits of points a voxel",
     "points_in_view": "out of the camera's view",
     "points_not_ego": "on the car's own body",
     "points_pass_1": "hidden in pass 1",

@@ -21,7 +21,7 @@ class Rows(NamedTuple):
     start: (2 V + 1,) int64. head, tail: (2 V,) int64, ends of the run in the windows.
     offset: (P, 3) float32, metres from the voxel's corner. burst: (P,) int32 ordinals.
     kept: (P,) bool, what cleaning leaves. changed: (V,) bool, cleaning is out of date.
-    clean: (V,) int64 inliers, before thinning. corner: (V, 3) float64 world, metres.
+    clean, left: (V,) int64 inliers, and how many of them are kept. corner: (V, 3) float64 world, metres.
     """
 
     start: npt.NDArray[np.int64]
@@ -32,6 +32,7 @@ class Rows(NamedTuple):
     kept: npt.NDArray[np.bool_]
     changed: npt.NDArray[np.bool_]
     clean: npt.NDArray[np.int64]
+    left: npt.NDArray[np.int64]
     corner: npt.NDArray[np.float64]
 
 
@@ -218,26 +219,38 @@ def clean(
                 inlier = total > 0 and radius[k] <= largest
                 rows.kept[place[k]] = inlier and rank * share // total != (rank - 1) * share // total
                 rank += inlier
-            rows.clean[v] = total
+            rows.clean[v], rows.left[v] = total, share
         inliers += rows.clean[v]
-        thinned += min(limit, rows.clean[v]) if limit > 0 else rows.clean[v]
+        thinned += rows.left[v]
     return inliers, thinned
 
 
 @compiled
-def emit(rows: Rows, near: Any, view: View, keyframe: int, points: Any, own: Any) -> tuple[int, int]:
+def emit(
+    rows: Rows,
+    near: Any,
+    view: View,
+    size: float,
+    pixels_per_point: float,
+    keyframe: int,
+    points: Any,
+    own: Any,
+) -> tuple[int, int, int]:
     """Write what cleaning kept of the voxels listed, as far as it is in view and not on the car's own body.
+
+    Of a voxel no more than one point for `pixels_per_point` pixels that it covers; see `reference.thinning`.
 
     points, own : (P, 3) float64 camera_left, metres, and (P,) bool, from burst `keyframe`; outputs.
 
     Returns
     -------
-    Points in view, and of these those that are not on the body: as many are written.
+    Points within that limit, of these those in view, and of these those not on the body: as many are written.
     """
     rotation, translation = view.rotation, view.translation
     rows_ego, columns_ego = view.ego.shape
     corner = np.empty(3)
-    in_view = count = 0
+    half = rotation[2, 0] * (size / 2) + rotation[2, 1] * (size / 2) + rotation[2, 2] * (size / 2)
+    thinned = in_view = count = 0
     for v in near:
         for k in range(3):
             corner[k] = (
@@ -245,10 +258,20 @@ def emit(rows: Rows, near: Any, view: View, keyframe: int, points: Any, own: Any
                 + rotation[k, 1] * rows.corner[v, 1]
                 + rotation[k, 2] * rows.corner[v, 2]
             ) + translation[k]
+        total = rows.left[v]
+        share = total
+        if pixels_per_point > 0:
+            edge = view.fx * size / max(corner[2] + half, view.nearest)
+            share = min(total, max(1, int(edge * edge / pixels_per_point)))
+        rank = 0
         for row in range(2 * v, 2 * v + 2):
             for at in range(rows.head[row], rows.tail[row]):
                 if not rows.kept[at]:
                     continue
+                rank += 1
+                if (rank - 1) * share // total == (rank - 2) * share // total:
+                    continue
+                thinned += 1
                 a, b, c = (
                     np.float64(rows.offset[at, 0]),
                     np.float64(rows.offset[at, 1]),
@@ -269,4 +292,4 @@ def emit(rows: Rows, near: Any, view: View, keyframe: int, points: Any, own: Any
                     column = int(min(max(np.rint(x / z * view.fx + view.cx), 0), columns_ego - 1))
                     count -= view.ego[line, column]
                 count += 1
-    return in_view, count
+    return thinned, in_view, count

@@ -12,7 +12,7 @@ from card.geometry import inverse
 from card.ground_truth.left_camera import LeftCamera
 from card.ground_truth.reference.mad import mad_inliers
 from card.ground_truth.reference.static_cloud import StaticCloud, seen_by
-from card.ground_truth.reference.thinning import thin
+from card.ground_truth.reference.thinning import pixel_limit, thin
 from card.ground_truth.selection import Selection, diagonal
 from card.ground_truth.static_set import StaticSet
 
@@ -55,7 +55,14 @@ def select(
     )
     kept = kept[clean]
     counts["points_clean"] = len(kept)
-    kept = kept[thin(cloud.voxel[kept], settings["points_per_voxel"])]
+    if settings["points_per_voxel"]:
+        kept = kept[thin(cloud.voxel[kept], np.full(len(corners), settings["points_per_voxel"]))]
+    if settings["pixels_per_point"]:
+        depth, image = np.maximum(centres[:, 2], nearest), camera.undistorted
+        limit = pixel_limit(depth, static.grid.size, image.fx, settings["pixels_per_point"])
+        # Front LiDAR first, each in order of time.
+        kept = kept[np.argsort(~cloud.front[kept], kind="stable")]
+        kept = kept[thin(cloud.voxel[kept], limit)]
     counts["points_thinned"] = len(kept)
 
     points = corners[cloud.voxel[kept]] + _turned(matrix, cloud.offset[kept].astype(np.float64))
