@@ -26,12 +26,12 @@ WORK = OUT.parent / "field_wheels"
 
 
 def estimated(field: Field, inputs: Inputs, folder: Path) -> Path:
-    """The trajectory that the poses stage estimates of a drive, in `folder`."""
+    """The trajectory that the poses stage estimates of a drive with the calibration at hand, in `folder`."""
     folder.mkdir(parents=True, exist_ok=True)
     if (folder / "poses.parquet").is_file():
         return folder / "poses.parquet"
-    odometry(field.folder, folder, inputs.bursts)
-    batch(field.folder, folder, inputs.bursts)
+    odometry(field.folder, folder, inputs.bursts, inputs.calibration)
+    batch(field.folder, folder, inputs.bursts, inputs.calibration)
     take_refined(
         refined=folder / "trajectory.parquet",
         recording=inputs.recording,

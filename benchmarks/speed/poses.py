@@ -55,19 +55,21 @@ def write_bursts_table(folder: Path, scratch: Path) -> None:
     write_table(scratch / "bursts.parquet", columns, "bursts")
 
 
-def odometry(folder: Path, scratch: Path, bursts: Path | None = None) -> None:
-    """Stage 1 of a drive; `bursts` is its table if that is not in `scratch`."""
+def odometry(
+    folder: Path, scratch: Path, bursts: Path | None = None, calibration: Path | None = None
+) -> None:
+    """Stage 1 of a drive; `bursts`: its table if not in `scratch`; `calibration`: if not its own."""
     estimate_odometry(
-        **_shared(folder, scratch, bursts),
+        **_shared(folder, scratch, bursts, calibration),
         report=scratch / "odometry.report.json",
         settings=default_settings("odometry"),
     )
 
 
-def batch(folder: Path, scratch: Path, bursts: Path | None = None) -> None:
-    """Stage 2 of a drive; `bursts` as in `odometry`."""
+def batch(folder: Path, scratch: Path, bursts: Path | None = None, calibration: Path | None = None) -> None:
+    """Stage 2 of a drive; `bursts` and `calibration` as in `odometry`."""
     refine_odometry(
-        **_shared(folder, scratch, bursts),
+        **_shared(folder, scratch, bursts, calibration),
         trajectory=scratch / "trajectory.parquet",
         nodes=scratch / "nodes.parquet",
         loops=scratch / "loops.parquet",
@@ -78,10 +80,10 @@ def batch(folder: Path, scratch: Path, bursts: Path | None = None) -> None:
     )
 
 
-def _shared(folder: Path, scratch: Path, bursts: Path | None) -> dict[str, Any]:
+def _shared(folder: Path, scratch: Path, bursts: Path | None, calibration: Path | None) -> dict[str, Any]:
     return {
         "recording": folder / "recording",
-        "calibration": folder / "calibration.json",
+        "calibration": calibration or folder / "calibration.json",
         "bursts": bursts or scratch / "bursts.parquet",
         "odometry": scratch / "odometry.parquet",
         "gates": [],
