@@ -34,7 +34,7 @@ from card.ground_truth.voxels import VoxelGrid
 LAP_NS = 60_000_000_000
 #: From one lap to the next, metres: beyond the reach of the LiDARs.
 SHIFT_M = np.array([0.0, 1500.03, 0.0])
-FRAMES = 200
+FRAMES = 120
 
 
 class Laps:
@@ -105,7 +105,7 @@ def _make_frames(scene: FullScale, drive: Laps, static: StaticSet) -> None:
     window = StaticWindow(drive, static, scene.camera, scene.settings)
     workspace = Workspace()
     for start in range(0, FRAMES, BLOCK_FRAMES):
-        times = [middle + k * 100_000_000 for k in range(start, start + BLOCK_FRAMES)]
+        times = [middle + k * 100_000_000 for k in range(start, min(start + BLOCK_FRAMES, FRAMES))]
         windows = [frame_window(drive, t_ns, True, scene.settings).bursts for t_ns in times]
         window.open(np.unique(np.concatenate(windows)))
         for t_ns, bursts in zip(times, windows, strict=True):
@@ -116,7 +116,7 @@ def _make_frames(scene: FullScale, drive: Laps, static: StaticSet) -> None:
 
 
 def _points_on_disk(drive: Any, bursts: NDArray[np.int64]) -> Path:
-    folder = OUT / "world points"
+    folder = OUT.parent / "world points"
     if not folder.is_dir():
         with atomic_folder(folder) as partial:
             for i in progress(bursts, "world points"):
