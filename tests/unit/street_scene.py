@@ -59,6 +59,16 @@ def tunnel(length: float = 400.0) -> np.ndarray:
     )
 
 
+def trunks(length: float = 80.0, gap: float = 8.0) -> np.ndarray:
+    """Nothing but trunks half a metre thick on both sides, in three rows."""
+    boxes = []
+    for i, y in enumerate(np.arange(-40.0, length, gap)):
+        for side in (-1, 1):
+            x = side * 6.0 + 2.5 * (i % 3) * side
+            boxes.append([[x - 0.25, y - 0.25, GROUND], [x + 0.25, y + 0.25, GROUND + 6]])
+    return np.array(boxes)
+
+
 def swaying(speed: float = 6.0, turn: float = 0.0, heave: float = 0.02) -> Motion:
     """Constant speed along y, or on a circle for a turn rate in rad/s, the body swaying."""
 

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from both_stages import expected, figures, refined, run
 from scipy.spatial.transform import Rotation
-from street_scene import START_NS, Motion, Street, houses, standing, swaying, tunnel
+from street_scene import START_NS, Street, houses
 
 from card.artifacts import default_settings, read_json, read_table, write_table
 from card.errors import CardError
@@ -15,54 +16,13 @@ from card.estimation.batch import Nodes
 from card.estimation.dense import dense_trajectory
 from card.estimation.odometry import plane_settings
 from card.geometry import Trajectory, inverse, transform
-from card.poses.anchor import anchor
-from card.poses.estimate_odometry import estimate_odometry
 from card.poses.inputs import open_imu, open_scans
 from card.poses.loops import LoopVerifier, candidates, travelled
 from card.poses.map_quality import map_figures
-from card.poses.pose_graph import refine_odometry
 from card.poses.sweep_store import SweepStore, along_trajectory
 from card.poses.take_refined import take_refined
 
 NEAR = {"loop_min_way_m": 8.0, "loop_coarse_m": 4.0, "loop_spacing_m": 2.0, "loop_radius_m": 3.0}
-
-
-def run(folder: Path, odometry: dict[str, Any] | None = None, **changes: Any) -> dict[str, Any]:
-    """Both stages, the first with changed settings of its own; the report of the second."""
-    files = {name: folder / f"{name}.parquet" for name in ("bursts", "odometry", "nodes", "loops")}
-    shared = {"recording": folder, "calibration": folder / "calibration.json", "gates": []}
-    stage_1 = default_settings("odometry") | (odometry or {})
-    if not files["odometry"].exists():
-        estimate_odometry(
-            **shared,
-            bursts=files["bursts"],
-            odometry=files["odometry"],
-            report=folder / "odometry.report.json",
-            settings=stage_1,
-        )
-    refine_odometry(
-        **shared,
-        **files,
-        trajectory=folder / "refined.parquet",
-        g2o=folder / "graph.g2o",
-        report=folder / "pose_graph.report.json",
-        settings=default_settings("pose_graph") | changes,
-        odometry_settings=stage_1,
-    )
-    return read_json(folder / "pose_graph.report.json", "report")
-
-
-def figures(report: dict[str, Any]) -> dict[str, float]:
-    return {figure["name"]: figure["value"] for figure in report["figures"]}
-
-
-def refined(folder: Path) -> Trajectory:
-    return Trajectory.from_table(read_table(folder / "refined.parquet", "trajectory"))
-
-
-def expected(street: Street, t_ns: np.ndarray) -> np.ndarray:
-    """True poses (N, 4, 4) in the world of the design: origin and heading of the first."""
-    return anchor(street.poses(t_ns), np.array([0, 0, 1.0]))
 
 
 def there_and_back(t: np.ndarray) -> tuple[np.ndarray, Rotation]:
@@ -126,31 +86,17 @@ def test_the_same_odometry_gives_the_same_bytes(folder: Path, report: dict[str, 
     assert {name: (folder / name).read_bytes() for name in names} == before
 
 
-def test_without_revisits_the_record_says_so(street: Street, folder: Path, tmp_path: Path) -> None:
+def test_without_revisits_the_record_says_so(
+    street: Street, folder: Path, report: dict[str, Any], tmp_path: Path
+) -> None:
     for name in ("odometry", "bursts", "imu"):
         (tmp_path / f"{name}.parquet").write_bytes((folder / f"{name}.parquet").read_bytes())
     for name in ("calibration.json", "recording.yaml"):
         (tmp_path / name).write_bytes((folder / name).read_bytes())
     (tmp_path / "lidar_front").symlink_to(folder / "lidar_front")
-    report = run(tmp_path)
-    assert "no loop: drift over the whole drive is not corrected by revisits" in report["notes"]
+    alone = run(tmp_path)
+    assert "no loop: drift over the whole drive is not corrected by revisits" in alone["notes"]
     path = refined(tmp_path)
-    error = path.translation_m - expected(street, path.t_ns)[:, :3, 3]
-    assert np.linalg.norm(error, axis=1).max() < 0.02
-
-
-@pytest.mark.parametrize("lidars", [["lidar_rear"], ["lidar_front", "lidar_rear"]])
-def test_the_rear_lidar_leads_as_well_alone_or_beside_the_front(tmp_path: Path, lidars: list[str]) -> None:
-    both = ("lidar_front", "lidar_rear")
-    street = Street(houses(length=40), swaying(6.0, turn=0.1), seconds=2.0, columns=120, lidars=both)
-    folder = street.record(tmp_path / "drive")
-    report = run(folder, odometry={"lidars": lidars})
-    table = read_table(folder / "odometry.parquet", "odometry_states")
-    assert set(table["lidar"].to_pylist()) == set(lidars)
-    assert table.num_rows == 19 * len(lidars)
-    assert np.all(table["registered"].to_numpy(zero_copy_only=False)[1:])
-    assert report["counts"]["nodes"] == table.num_rows
-    path = refined(folder)
     error = path.translation_m - expected(street, path.t_ns)[:, :3, 3]
     assert np.linalg.norm(error, axis=1).max() < 0.02
 
@@ -257,26 +203,6 @@ def test_every_pass_by_a_place_is_a_candidate_of_its_own() -> None:
         assert np.linalg.norm(poses[earlier, :3, 3] - poses[later, :3, 3]) < (0.4 if earlier else 3.0)
     last = max(later for _, later in pairs)
     assert len([pair for pair in pairs if pair[1] == last]) == 2
-
-
-@pytest.mark.parametrize(
-    ("name", "boxes", "motion", "weak"),
-    [
-        ("standing", houses(length=40), standing, False),
-        ("tunnel", tunnel(), swaying(6.0), True),
-    ],
-)
-def test_what_scans_leave_open_is_named(
-    tmp_path: Path, name: str, boxes: np.ndarray, motion: Motion, weak: bool
-) -> None:
-    street = Street(boxes, motion, seconds=2.0, columns=120)
-    report = run(street.record(tmp_path / name), weak_s=0.5)
-    assert (figures(report)["longest_weak_s"] > 1.5) is weak
-    assert any("weakly determined" in note for note in report["notes"]) is weak
-    path = refined(tmp_path / name)
-    error = path.translation_m - expected(street, path.t_ns)[:, :3, 3]
-    # Along the tunnel only the IMU leads, from a velocity that nothing tells.
-    assert np.abs(error[:, [0, 2]] if weak else error).max() < 0.02
 
 
 def test_between_nodes_the_trajectory_follows_the_imu_through_them(street: Street, folder: Path) -> None:

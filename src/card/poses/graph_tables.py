@@ -30,7 +30,7 @@ def sigma_of(
         rotation, both, place = information[k, :3, :3], information[k, :3, 3:], information[k, 3:, 3:]
         values, vectors = np.linalg.eigh(place - both.T @ np.linalg.pinv(rotation) @ both)
         sigma[k] = settings["odometry_inflation"] / np.sqrt(max(values[0], 1e-12))
-        weak[k] = sigma[k] > settings["weak_sigma_m"] or values[0] < settings["weak_ratio"] * values[2]
+        weak[k] = sigma[k] > settings["weak_sigma_m"]
         direction[k] = int(np.argmax(np.abs(vectors[:, 0])))
     # The first sweep begins the map.
     if count > 1:

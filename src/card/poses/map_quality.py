@@ -14,9 +14,9 @@ from card.estimation.scans import Limits, Scans
 from card.geometry import Trajectory, apply
 from card.poses.loops import candidates, spaced, travelled
 from card.poses.sweep_store import SweepStore, along_trajectory
+from card.recording.paths import LIDARS
 
 Array = NDArray[np.float64]
-LIDAR = "lidar_front"
 #: Edge of the voxels whose thickness tells the sharpness, m, and of those that thin a sweep.
 SHARP_LEAF_M, POINTS_LEAF_M, SCAN_LEAF_M = 0.5, 0.1, 0.5
 #: Way around an earlier visit whose sweeps make the map that a later sweep is compared with, m.
@@ -31,12 +31,17 @@ def map_figures(
     trajectory: Trajectory,
     settings: Mapping[str, Any],
 ) -> list[Figure]:
-    """Figures of the map of the front LiDAR's sweeps along a trajectory; None without sweeps or revisits."""
+    """Figures of the map that one LiDAR's sweeps make along a trajectory; None without sweeps or revisits.
+
+    It is the front one, or the rear one of a car without: a map of both would tell of their calibration too.
+    """
     thickness: float | None = None
     heights = np.zeros(0)
-    if LIDAR in bursts["lidar"].to_pylist():
+    present = [lidar for lidar in LIDARS if lidar in bursts["lidar"].to_pylist()]
+    if present:
         near, far = settings["quality_range_m"]
-        scans = Scans(recording, bursts, calibration, sensors, [LIDAR], Limits(near, far, (-180.0, 180.0)))
+        limits = Limits(near, far, (-180.0, 180.0))
+        scans = Scans(recording, bursts, calibration, sensors, present[:1], limits)
         poses = trajectory.at(scans.end_ns)
         chosen = spaced(travelled(poses), settings["quality_spacing_m"])
         store = SweepStore(scans, chosen, along_trajectory(trajectory), POINTS_LEAF_M)
