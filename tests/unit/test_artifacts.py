@@ -198,6 +198,8 @@ def test_documents_refuse_nan_and_unknown_fields(tmp_path: Path) -> None:
         write_json(path, {**document, "extra": 1}, "report")
     with pytest.raises(CardError, match="not finite"):
         write_json(path, {**document, "settings": {"a": float("nan")}}, "report")
+    with pytest.raises(CardError, match="not finite"):
+        write_json(path, {**document, "settings": {"a": [[1.0, float("inf")], [2.0]]}}, "report")
     path.write_text("{")
     with pytest.raises(CardError, match=r"r\.json:1: not JSON"):
         read_json(path, "report")

@@ -30,6 +30,17 @@ def test_a_burst_comes_back(tmp_path: Path, count: int) -> None:
     assert after.end_ns == (int(after.time_ns.max()) if count else START_NS)
 
 
+@pytest.mark.parametrize("count", [0, 5000])
+def test_intensity_is_left_out_where_it_is_not_wanted(tmp_path: Path, count: int) -> None:
+    path = tmp_path / f"{START_NS}.laz"
+    write_burst(path, burst(START_NS, count))
+    whole, part = read_burst(path), read_burst(path, intensity=False)
+    for name in ("points", "ring", "offset_ns"):
+        np.testing.assert_array_equal(getattr(part, name), getattr(whole, name))
+    np.testing.assert_array_equal(part.intensity, np.zeros(count, dtype=np.uint8))
+    assert part.intensity.dtype == whole.intensity.dtype
+
+
 @settings(max_examples=20, deadline=None)
 @given(st.lists(st.floats(-300, 300), min_size=3, max_size=30))
 def test_coordinates_are_rounded_to_a_tenth_of_a_millimetre(

@@ -4,21 +4,24 @@ import csv
 import json
 import math
 from collections.abc import Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 from card.artifacts.atomic import atomic_file
+from card.artifacts.json_text import json_text
 from card.artifacts.schemas import check, load_schema
 from card.errors import CardError
+
+_PLAIN = {str, int, float, bool, type(None)}
 
 
 def write_json(path: Path, document: Any, schema: str) -> None:
     """Write a document that fits ``schema``: UTF-8, sorted keys, no NaN or infinity."""
     plain = _plain(document, path)
     check(plain, schema, path)
-    text = json.dumps(plain, indent=1, sort_keys=True, ensure_ascii=False, allow_nan=False)
     with atomic_file(path) as partial:
-        partial.write_text(text + "\n", encoding="utf-8")
+        partial.write_text(json_text(plain), encoding="utf-8")
 
 
 def read_json(path: Path, schema: str) -> Any:
@@ -93,6 +96,8 @@ def _text(path: Path) -> str:
 
 def _plain(value: Any, path: Path) -> Any:
     """Builtins of a value that may hold numpy scalars and arrays."""
+    if isinstance(value, list) and _is_plain(value):
+        return value
     if hasattr(value, "tolist"):
         value = value.tolist()
     if isinstance(value, Mapping):
@@ -102,3 +107,11 @@ def _plain(value: Any, path: Path) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         raise CardError("number is not finite", where=path, found=value)
     return value
+
+
+def _is_plain(values: list[Any]) -> bool:
+    """Whether a list, or the lists in it, hold builtins alone and no number that is not finite."""
+    flat = list(chain.from_iterable(values)) if set(map(type, values)) == {list} else values
+    if not set(map(type, flat)) <= _PLAIN:
+        return False
+    return all(math.isfinite(value) for value in flat if type(value) is float)

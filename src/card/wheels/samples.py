@@ -90,7 +90,7 @@ class Cutter:
     def _near_points(self, entry: BurstFile, windows: Sequence[tuple[float, float]]) -> Array:
         """World points (P, 3) of a burst near the paths."""
         lidar = self.lidars[entry.lidar]
-        whole = read_burst(entry.file)
+        whole = read_burst(entry.file, intensity=False)
         burst = crop_burst(whole, lidar.rig_from_lidar, self.trajectory, self._tracks, windows)
         return deskew_burst(
             burst,
