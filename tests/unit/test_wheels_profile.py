@@ -108,7 +108,7 @@ def test_variance_is_that_of_the_inverse() -> None:
     arc, across = np.sort(rng.uniform(0, 3, 90)), rng.uniform(-1, 1, 90)
     weight = rng.uniform(0, 1, arc.size)
     equations = NormalEquations(arc, across, np.zeros(arc.size), -0.1, 0.1, 34, True)
-    equations.weigh(weight)
+    equations.weigh(weight, np.ones(31, dtype=bool))
     variance = equations.variance(0.01, 1.0)
     profile = Profile(-0.1, 0.1, np.zeros((34, 2)), variance)
     along = design_matrix(arc, profile)

@@ -16,6 +16,7 @@ from card.artifacts import (
     write_report,
     write_table,
 )
+from card.artifacts.processes import in_processes
 from card.geometry import Trajectory, from_json
 from card.recording.description import read_description
 from card.wheels.arc_height import Corridor
@@ -54,7 +55,7 @@ def excite(
     recording : folder with the bursts.
     bursts, frames, calibration, trajectory, static_voxels : artifacts of the schemas of these names.
     wheel_excitation, road_planes, report : the files to write.
-    threads : processes that cut the corridors out of the bursts; the bytes do not depend on it.
+    threads : processes that share the bursts and the wheels; the bytes do not depend on it.
 
     Raises
     ------
@@ -86,10 +87,12 @@ def excite(
     samples = collect_samples(files, cutter, threads)
     spline = SplineSettings(**{name: settings[name] for name in SplineSettings.__dataclass_fields__})
     quality = QualitySettings(**{name: settings[name] for name in QualitySettings.__dataclass_fields__})
-    wheels = {
-        name: fit_excitation(paths[name], road, spline, quality, settings["footprint_m"])
+    fits = [
+        (paths[name], road, spline, quality, settings["footprint_m"])
         for name, road in zip(WHEELS, samples, strict=True)
-    }
+    ]
+    found = in_processes(lambda wheel: fit_excitation(*fits[wheel]), range(len(WHEELS)), threads)
+    wheels = dict(zip(WHEELS, found, strict=True))
 
     table = read_table(frames, "frames")
     t_ns = np.asarray(table["t_ns"], dtype=np.int64)

@@ -26,7 +26,7 @@ def uniform_basis(
 
 
 class NormalEquations:
-    """Weighted least squares of heights (N,) over splines of `count` coefficients in elevation and tilt.
+    """Weighted least squares of heights (N,) over splines of K = `count` coefficients in elevation and tilt.
 
     The unknowns are ordered elevation 0, tilt 0, elevation 1, tilt 1 and so on. across : (N,) where a point
     lies in the corridor, from -1 at its left edge to 1 at its right one.
@@ -45,20 +45,33 @@ class NormalEquations:
         self._first, self._basis = uniform_basis(arc, start_m, spacing_m, count)
         self._across, self._height, self._count = across, height, count
         self._kernels = spline_kernels if compiled else PlainKernels
+        #: Where the points of each interval begin, and where the last ones end.
+        self._begin = np.searchsorted(self._first, np.arange(count - 2))
         self._products = np.zeros((3, 10, count - 3))
         self._right = np.zeros((2, 4, count - 3))
 
-    def weigh(self, weights: Array) -> None:
-        """Sum up the points with these weights (N,)."""
-        points = (self._first, self._basis, self._across, self._height, weights)
-        self._products, self._right = self._kernels.sums(*points, self._count - 3)
+    def points(self, intervals: NDArray[np.bool_]) -> NDArray[np.int64] | slice:
+        """The points that lie in the chosen ones (K - 3,) of the knot intervals."""
+        if intervals.all():
+            return slice(None)
+        begin, size = self._begin[:-1][intervals], np.diff(self._begin)[intervals]
+        return np.arange(size.sum()) + np.repeat(begin - np.cumsum(size) + size, size)
 
-    def residual(self, coefficients: Array) -> Array:
-        """Heights (N,) over the splines of coefficients (K, 2)."""
-        found: Array = self._kernels.residual(
-            self._first, self._basis, self._across, self._height, coefficients
-        )
+    def weigh(self, weights: Array, intervals: NDArray[np.bool_]) -> None:
+        """Sum up the points of the chosen intervals (K - 3,) with weights (P,); the other sums stay."""
+        first, basis, across, height = self._part(self.points(intervals))
+        among_chosen = np.cumsum(intervals) - 1
+        points = (among_chosen[first], basis, across, height, weights)
+        sums = self._kernels.sums(*points, int(np.count_nonzero(intervals)))
+        self._products[..., intervals], self._right[..., intervals] = sums
+
+    def residual(self, coefficients: Array, chosen: NDArray[np.int64] | slice) -> Array:
+        """Heights (P,) of the chosen points over the splines of coefficients (K, 2)."""
+        found: Array = self._kernels.residual(*self._part(chosen), coefficients)
         return found
+
+    def _part(self, chosen: NDArray[np.int64] | slice) -> tuple[NDArray[np.int64], Array, Array, Array]:
+        return self._first[chosen], self._basis[chosen], self._across[chosen], self._height[chosen]
 
     def solve(self, penalty: float, tilt_penalty: float) -> Array:
         """Coefficients (K, 2)."""
@@ -67,7 +80,9 @@ class NormalEquations:
             for a in range(4):
                 right[a : a + self._count - 3, m] += self._right[m, a]
         band = self._band(penalty, tilt_penalty)
-        solution = solveh_banded(band, right.ravel(), lower=True, overwrite_ab=True, overwrite_b=True)
+        solution = solveh_banded(
+            band, right.ravel(), lower=True, overwrite_ab=True, overwrite_b=True, check_finite=False
+        )
         return np.asarray(solution, dtype=np.float64).reshape(self._count, 2)
 
     def variance(self, penalty: float, tilt_penalty: float) -> Array:

@@ -3,12 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import ArrayLike, NDArray
 
 from card.wheels.normal_equations import NormalEquations, uniform_basis
 
 Array = NDArray[np.float64]
-MAX_ITERATIONS = 100
+MAX_ITERATIONS = 400
 CONVERGED_M = 1e-7
 #: Gauss points along a footprint; a piece of spline between knots is of third degree.
 FOOTPRINT_POINTS = 6
@@ -112,18 +113,25 @@ def fit_profile(
     count = int(np.ceil((float(arc.max()) - start) / spacing)) + 4
     across = sideways / settings.corridor_half_width_m
     equations = NormalEquations(arc, across, height, start, spacing, count, compiled)
-    coefficients = np.zeros((count, 2))
-    scale = settings.tukey_start_m
-    residual = height - (0.0 if guess is None else guess)
+    everywhere: NDArray[np.bool_] = np.ones(count - 3, dtype=np.bool_)
+    moving, scale = everywhere, settings.tukey_start_m
+    equations.weigh(tukey_weights(height - (0.0 if guess is None else guess), scale), everywhere)
+    #: The coefficients that each interval was last weighed with.
+    weighed = np.zeros((count - 3, 2, 4))
     for _ in range(MAX_ITERATIONS):
         stiffness = (scale / settings.tukey_m) ** settings.penalty_anneal_power
-        equations.weigh(tukey_weights(residual, scale))
-        solution = equations.solve(stiffness * settings.penalty, stiffness * settings.tilt_penalty)
-        step = float(np.abs(solution - coefficients).max())
-        coefficients, residual = solution, equations.residual(solution)
-        if scale == settings.tukey_m and step < CONVERGED_M:
-            break
+        coefficients = equations.solve(stiffness * settings.penalty, stiffness * settings.tilt_penalty)
+        alive = sliding_window_view(coefficients, 4, axis=0)
+        if scale == settings.tukey_m:
+            # Most of a drive is at rest long before the last place where two surfaces vie.
+            moving = np.asarray((np.abs(alive - weighed) >= CONVERGED_M).any(axis=(1, 2)))
+            if not moving.any():
+                break
         scale = max(scale * settings.anneal_factor, settings.tukey_m)
+        weighed[moving] = alive[moving]
+        residual = equations.residual(coefficients, equations.points(moving))
+        equations.weigh(tukey_weights(residual, scale), moving)
+    residual = equations.residual(coefficients, equations.points(everywhere))
     variance = equations.variance(settings.penalty, settings.tilt_penalty)
     profile = Profile(start, spacing, coefficients, variance)
     return profile, residual, tukey_weights(residual, settings.tukey_m)

@@ -1,6 +1,6 @@
 """Which points lie in the static voxels of a sequence."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cache
 from itertools import product
 
@@ -25,10 +25,15 @@ class StaticVoxels:
     def __init__(self, arrays: Mapping[str, NDArray[np.generic]]) -> None:
         self._origin = np.asarray(arrays["origin"], dtype=np.float64)
         self._size = float(arrays["voxel_size"])
-        ids = np.asarray(arrays["ids"], dtype=np.int64).reshape(-1, 3)
-        self._low = ids.min(axis=0) if len(ids) else np.zeros(3, dtype=np.int64)
-        self._extent = ids.max(axis=0) - self._low + 1 if len(ids) else np.zeros(3, dtype=np.int64)
-        self._keys = np.sort(self._key(ids - self._low))
+        columns = np.asarray(arrays["ids"]).reshape(-1, 3).T
+        some = columns.shape[1] > 0
+        self._low = np.array([column.min() if some else 0 for column in columns], dtype=np.int64)
+        high = np.array([column.max() if some else -1 for column in columns], dtype=np.int64)
+        self._extent = high - self._low + 1
+        pairs = zip(columns, self._low, strict=True)
+        keys = self._key(column.astype(np.int64) - low for column, low in pairs)
+        # Ten million are sorted in a second; as they are written they are in order.
+        self._keys = keys if (keys[1:] > keys[:-1]).all() else np.sort(keys)
 
     def near(self, points: Array, reach: int, compiled: bool = True) -> NDArray[np.bool_]:
         """Whether each of the points (N, 3), metres in world, lies at most `reach` voxels off a static one.
@@ -50,10 +55,12 @@ class StaticVoxels:
         within = np.all((voxel >= 0) & (voxel < self._extent), axis=1)
         if not within.any():
             return within
-        keys = self._key(voxel[within])
+        keys = self._key(voxel[within].T)
         at = np.minimum(np.searchsorted(self._keys, keys), len(self._keys) - 1)
         within[within] = self._keys[at] == keys
         return within
 
-    def _key(self, voxel: NDArray[np.int64]) -> NDArray[np.int64]:
-        return (voxel[:, 0] * self._extent[1] + voxel[:, 1]) * self._extent[2] + voxel[:, 2]
+    def _key(self, columns: Iterable[NDArray[np.int64]]) -> NDArray[np.int64]:
+        """One number (N,) for each voxel; columns : three of (N,), from the lowest voxel."""
+        x, y, z = columns
+        return (x * self._extent[1] + y) * self._extent[2] + z
