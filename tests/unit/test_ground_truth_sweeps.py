@@ -91,3 +91,13 @@ def test_the_cache_is_bounded_and_changes_nothing(inputs, monkeypatch):
             assert np.array_equal(small.sweep(i).points, points)
             held = sum(len(sweep.points) for sweep in small._cache.values())
             assert held <= max(2000, len(points))
+
+
+def test_while_frames_go_by_only_sweeps_of_the_front_lidar_are_kept(inputs):
+    drive = opened(inputs)
+    drive.keep(2000)
+    for i in range(len(drive)):
+        drive.sweep(i)
+    assert all(drive.front[i] for i in drive._cache)
+    assert next(reversed(drive._cache)) == drive.of(True)[-1]
+    assert sum(len(sweep.points) for sweep in drive._cache.values()) <= 2000

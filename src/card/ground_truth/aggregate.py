@@ -37,8 +37,9 @@ from card.ground_truth.voxels import unpack
 
 #: Frames whose bursts are ordered by voxel at once: more take more memory, fewer more time.
 BLOCK_FRAMES = 100
-#: World points that each process keeps meanwhile: a burst that enters the windows is a keyframe 13 s later.
-FRAME_POINTS = 16_000_000
+#: World points of front bursts that each process keeps meanwhile: one that enters the windows is a keyframe
+#: 13 s later, and a block may read ten seconds ahead.
+FRAME_POINTS = 12_000_000
 
 
 def aggregate(

@@ -100,16 +100,18 @@ class Drive:
             return self._cache[i]
         sweep = self._read(i)
         # What one pass over a long drive leaves would be pushed out before the next pass comes to it.
-        if self._sliding or self._cached_points + len(sweep.points) <= self._limit:
+        room = self._cached_points + len(sweep.points) <= self._limit
+        if self.front[i] if self._sliding else room:
             self._cache[i] = sweep
             self._cached_points += len(sweep.points)
             self._push_out()
         return sweep
 
     def keep(self, points: int) -> None:
-        """From now on keep no more than this many world points in memory: those last asked for.
+        """From now on keep no more than this many world points in memory, of the front bursts last asked for.
 
-        Until then passes over the whole drive are expected, and what comes first is kept.
+        A keyframe is one of them. Until then passes over the whole drive are expected, and what comes first
+        is kept.
         """
         self._limit, self._sliding = points, True
         self._push_out()
