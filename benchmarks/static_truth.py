@@ -12,6 +12,7 @@ from card.ground_truth.sweeps import Drive
 from card.ground_truth.voxel_map import VoxelMap, build_voxel_map
 from card.ground_truth.voxels import VoxelGrid, find
 from card.recording.burst import Burst
+from card.recording.paths import LIDARS
 
 #: DUFOMap's own defaults for 10 cm voxels: inflation of hits (m) and of the unknown (voxels).
 DUFOMAP = {"resolution": 0.1, "d_s": 0.2, "d_p": 2}
@@ -21,7 +22,10 @@ class TrueDrive(Drive):
     """A drive that knows which of its points move. truth : folder of the drive's truth."""
 
     def __init__(self, truth: Path, *arguments: Any) -> None:
-        self._truth = truth / "bursts"
+        self._truth = {
+            lidar: {int(file.stem): file for file in (truth / "bursts" / lidar).glob("*.npz")}
+            for lidar in LIDARS
+        }
         self._moving: dict[int, NDArray[np.bool_]] = {}
         super().__init__(*arguments)
 
@@ -33,7 +37,9 @@ class TrueDrive(Drive):
 
     def _takes_part(self, i: int, burst: Burst) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         real, inside = super()._takes_part(i, burst)
-        file = self._truth / self.sensor(i) / f"{self.files[i].stem}.npz"
+        # A bag's sweeps begin with their first packet, up to a packet after the simulated ones.
+        files = self._truth[self.sensor(i)]
+        file = files[min(files, key=lambda t_ns: abs(t_ns - int(self.start_ns[i])))]
         self._moving[i] = read_arrays(file, "truth_burst")["dynamic"][real & inside]
         return real, inside
 
