@@ -10,6 +10,8 @@ from card.wheels.contact_path import ContactPath
 from card.wheels.profile import SplineSettings, fit_profile
 
 Array = NDArray[np.float64]
+#: Residual at which Tukey's loss pulls most, by its scale.
+GREATEST_PULL = 5**-0.5
 
 
 @dataclass(frozen=True)
@@ -125,9 +127,11 @@ def _fit_run(
     if len(accepted) == 0:
         return _Samples.unknown(path.elevation(at, run))
     near = _Near(road.arc[accepted], at, quality.gap_reach_m)
-    # A point that the fit refused says as much against it as one that it barely took.
+    # A point that the fit refused speaks against it as loudly as one that pulls at it most, but no louder:
+    # a speck of dust among eighty points does not make them doubtful.
+    loudest = GREATEST_PULL * spline.tukey_m
     spread = _Near(road.arc, at, quality.gap_reach_m).rms(
-        np.ones(len(error)), np.clip(error, -spline.tukey_m, spline.tukey_m)
+        np.ones(len(error)), np.clip(error, -loudest, loudest)
     )
     ends = road.arc[accepted[0]] - spline.knot_spacing_m, road.arc[accepted[-1]] + spline.knot_spacing_m
     nearest = np.clip(at, *ends)
