@@ -122,7 +122,7 @@ class Scans:
         CardError
             For a file that cannot be read, or a sweep without a time a point that needs one.
         """
-        burst = read_burst(self._files[i])
+        burst = read_burst(self._files[i], intensity=False)
         name = str(self.lidar[i])
         if (
             not self._compensated[name]

@@ -121,7 +121,7 @@ class Drive:
             self._cached_points -= len(self._cache.popitem(last=False)[1].points)
 
     def _read(self, i: int) -> Sweep:
-        burst, lidar = read_burst(self.files[i]), self.sensor(i)
+        burst, lidar = read_burst(self.files[i], intensity=False), self.sensor(i)
         real, inside = self._takes_part(i, burst)
         keep = real & inside
         part = replace(

@@ -88,7 +88,7 @@ class Sight:
         if not len(self._files):
             return None
         nearest = int(np.abs(self._burst_ns - t_ns).argmin())
-        burst = read_burst(self._recording / self._files[nearest])
+        burst = read_burst(self._recording / self._files[nearest], intensity=False)
         try:
             world = deskew_burst(
                 burst, self._rig_from["lidar_front"], self._trajectory, self._corrections.get("lidar_front")

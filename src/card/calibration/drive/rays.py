@@ -129,7 +129,7 @@ class _Sweep:
 
 
 def _read(path: Path, lidar: int, number: int, limits: Limits, returns: int) -> _Sweep:
-    burst = read_burst(path)
+    burst = read_burst(path, intensity=False)
     if len(burst) > 1 and not np.any(burst.offset_ns != burst.offset_ns[0]):
         raise CardError(
             "sweep without a time for each point", where=path, found=f"{len(burst)} points of one time"
