@@ -203,6 +203,13 @@ def test_every_pass_by_a_place_is_a_candidate_of_its_own() -> None:
         assert np.linalg.norm(poses[earlier, :3, 3] - poses[later, :3, 3]) < (0.4 if earlier else 3.0)
     last = max(later for _, later in pairs)
     assert len([pair for pair in pairs if pair[1] == last]) == 2
+    # Where places may have drifted, only the latest visit counts: drift grows from round to round.
+    drifted = poses.copy()
+    drifted[:, 2, 3] = 0.03 * way
+    assert not candidates(drifted, spacing_m=30.0, radius_m=3.0, min_way_m=60.0)
+    pairs = candidates(drifted, spacing_m=30.0, radius_m=3.0, min_way_m=60.0, drift_share=0.03)
+    assert pairs
+    assert all(60 < way[later] - way[earlier] < 160 for earlier, later in pairs)
 
 
 def test_between_nodes_the_trajectory_follows_the_imu_through_them(street: Street, folder: Path) -> None:

@@ -55,11 +55,16 @@ def spaced(way: Array, spacing_m: float) -> NDArray[np.intp]:
     return np.array(chosen, dtype=np.intp)
 
 
-def candidates(poses: Array, spacing_m: float, radius_m: float, min_way_m: float) -> list[tuple[int, int]]:
+def candidates(
+    poses: Array, spacing_m: float, radius_m: float, min_way_m: float, drift_share: float = 0.0
+) -> list[tuple[int, int]]:
     """Pairs (earlier, later) of poses (N, 4, 4) that lie within a radius, the later ones `spacing_m` apart.
 
     Of the first and the last earlier pass through the radius the nearest node counts; passes are runs of
     nodes in a row. More passes would say little more, and a drive of many rounds would have too many.
+
+    drift_share : by which share of the way between two poses the radius grows. Then only the last pass
+        counts, to which least has drifted.
     """
     way, position = travelled(poses), poses[:, :3, 3]
     pairs = []
@@ -69,12 +74,12 @@ def candidates(poses: Array, spacing_m: float, radius_m: float, min_way_m: float
             continue
         earlier = np.flatnonzero(way < way[later] - min_way_m)
         distance = np.linalg.norm(position[earlier] - position[later], axis=1)
-        inside = np.flatnonzero(distance < radius_m)
+        inside = np.flatnonzero(distance < radius_m + drift_share * (way[later] - way[earlier]))
         if not len(inside):
             continue
         last = way[later]
         runs = np.split(inside, np.flatnonzero(np.diff(inside) > 1) + 1)
-        for run in runs[:1] + runs[1:][-1:]:
+        for run in runs[-1:] if drift_share else runs[:1] + runs[1:][-1:]:
             pairs.append((int(earlier[run[np.argmin(distance[run])]]), later))
     return pairs
 

@@ -62,13 +62,15 @@ def refine(
     """
     inflation = settings["loop_inflation"]
     solution = batch.solve(nodes, local)
-    drift = settings["drift_share"] * float(travelled(solution.poses)[-1])
     tried: set[tuple[int, int]] = set()
     loops: list[Loop] = []
-    for spacing, doubt in ((settings["loop_coarse_m"], drift), (settings["loop_spacing_m"], 0.0)):
-        radius = settings["loop_radius_m"] + doubt
-        pairs = candidates(solution.poses, spacing, radius, settings["loop_min_way_m"])
-        found = [verify(solution.poses, *pair, doubt) for pair in sorted(pairs)]
+    for spacing, share in (
+        (settings["loop_coarse_m"], settings["drift_share"]),
+        (settings["loop_spacing_m"], 0.0),
+    ):
+        poses, way = solution.poses, travelled(solution.poses)
+        pairs = candidates(poses, spacing, settings["loop_radius_m"], settings["loop_min_way_m"], share)
+        found = [verify(poses, a, b, share * float(way[b] - way[a])) for a, b in sorted(pairs)]
         tried |= set(pairs)
         # What the fine search finds from a better guess takes the place of the coarse.
         loops = [loop for loop in found if loop.accepted]
