@@ -112,9 +112,13 @@ class Batch:
         count = self._imu.size() + 1
         # Keys are in order of their letters: biases, gravity, then velocities and poses.
         wanted = [6 * k + i for k in nodes for i in range(6)] + [6 * count, 6 * count + 1]
-        unit = np.zeros((size, len(wanted)))
-        unit[wanted, np.arange(len(wanted))] = 1.0
-        sigma = scale[wanted] * np.sqrt(solve(unit)[wanted, np.arange(len(wanted))])
+        variance = np.empty(len(wanted))
+        # One by one: all columns at once would be the greatest memory of a long drive.
+        for k, entry in enumerate(wanted):
+            unit = np.zeros(size)
+            unit[entry] = 1.0
+            variance[k] = solve(unit)[entry]
+        sigma = scale[wanted] * np.sqrt(variance)
         bias = sigma[:-2].reshape(-1, 6)
         return Uncertainty(np.asarray(nodes, dtype=np.intp), bias[:, 3:], bias[:, :3], sigma[-2:])
 
