@@ -7,7 +7,7 @@ import numpy as np
 
 _compiled: Any = numba.njit(cache=True, nogil=True, error_model="numpy")
 #: Poses of a path that share a box: a point far from the box is far from all of them.
-BOX = 16
+BOX = 32
 
 
 @_compiled
