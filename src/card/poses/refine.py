@@ -53,24 +53,32 @@ def local_constraints(
 
 
 def refine(
-    batch: Batch, nodes: Nodes, local: Sequence[Between], verify: Verify, settings: Mapping[str, Any]
+    batch: Batch,
+    nodes: Nodes,
+    local: Sequence[Between],
+    verify: Verify,
+    settings: Mapping[str, Any],
+    known: Sequence[Loop] = (),
 ) -> Refined:
     """Plain solution with the loops of a coarse search, a fine search from there, and a robust solution.
 
     Robust kernels alone reject every true loop where the drift is large against what the odometry claims;
     so loops are proved by geometry first, and judged against each other only after they have pulled.
+
+    known : loops that were found otherwise; they pull beside those of the coarse search.
     """
     inflation = settings["loop_inflation"]
     solution = batch.solve(nodes, local)
-    tried: set[tuple[int, int]] = set()
+    tried = {(loop.first, loop.second) for loop in known}
     loops: list[Loop] = []
-    for spacing, share in (
-        (settings["loop_coarse_m"], settings["drift_share"]),
-        (settings["loop_spacing_m"], 0.0),
+    for spacing, share, others in (
+        (settings["loop_coarse_m"], settings["drift_share"], known),
+        (settings["loop_spacing_m"], 0.0, ()),
     ):
         poses, way = solution.poses, travelled(solution.poses)
         pairs = candidates(poses, spacing, settings["loop_radius_m"], settings["loop_min_way_m"], share)
         found = [verify(poses, a, b, share * float(way[b] - way[a])) for a, b in sorted(pairs)]
+        found += others
         tried |= set(pairs)
         # What the fine search finds from a better guess takes the place of the coarse.
         loops = [loop for loop in found if loop.accepted]
