@@ -21,11 +21,10 @@ def contradicted(votes: Votes, quotas_met: Mask, settings: Mapping[str, Any]) ->
 
     The quotas (C,) of supplement B say how much contradiction a voxel may take.
     """
-    share = votes.moved / np.maximum(votes.comparisons, 1)
     limit = np.where(
         quotas_met, settings["moved_fraction_quotas_met"], settings["moved_fraction_quotas_missed"]
     )
-    return (votes.moved >= settings["moved_votes"]) & (share >= limit)
+    return (votes.moved >= settings["moved_votes"]) & (votes.moved_share >= limit)
 
 
 def seldom_hit(votes: Votes, settings: Mapping[str, Any]) -> Mask:
@@ -48,8 +47,7 @@ def lone(keys: Index, dynamic: Mask, votes: Votes, settings: Mapping[str, Any]) 
     keys : (C,) increasing.
     """
     few = _near(keys, keys[dynamic], settings["near_voxels"]) - 1 <= settings["lone_voxels"]
-    share = votes.moved / np.maximum(votes.comparisons, 1)
-    return dynamic & few & (share < settings["moved_fraction_lone"])
+    return dynamic & few & (votes.moved_share < settings["moved_fraction_lone"])
 
 
 def accompanied(keys: Index, dynamic: Mask, votes: Votes, settings: Mapping[str, Any]) -> Mask:
@@ -62,9 +60,8 @@ def accompanied(keys: Index, dynamic: Mask, votes: Votes, settings: Mapping[str,
     if not settings["accompanied_voxels"]:
         return np.zeros(len(keys), dtype=np.bool_)
     near = _near(keys, keys[dynamic], settings["near_voxels"]) >= settings["accompanied_voxels"]
-    share = votes.moved / np.maximum(votes.comparisons, 1)
     accompanied: Mask = near & (votes.moved >= settings["moved_votes"])
-    return accompanied & (share >= settings["moved_fraction_near"])
+    return accompanied & (votes.moved_share >= settings["moved_fraction_near"])
 
 
 def vacated(votes: Votes, settings: Mapping[str, Any]) -> Mask:

@@ -49,6 +49,12 @@ class Votes:
         """(C,) sweeps that said something about the voxel: c_v."""
         return self.hits + self.beside + self.moved
 
+    @property
+    def moved_share(self) -> npt.NDArray[np.float64]:
+        """Share of the comparisons (C,) that say moved; 0 without any."""
+        share: npt.NDArray[np.float64] = self.moved / np.maximum(self.comparisons, 1)
+        return share
+
 
 def evidence_sweeps(drive: Drive, settings: Mapping[str, Any]) -> list[int]:
     """Of each LiDAR the bursts `flow_baseline_m` or `evidence_gap_s` after the last taken; every `step`-th.
