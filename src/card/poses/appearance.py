@@ -42,13 +42,10 @@ def returns(poses: Array, points: Points, settings: Mapping[str, Any]) -> list[t
     finder = MapClosures()
     middles: list[int] = []
     pairs = []
-    for number in range(piece[-1] + 1):
-        own = sweeps[piece == number]
-        middle = int(own[len(own) // 2]) if len(own) else middles[-1]
+    for number, own in enumerate(np.split(sweeps, np.flatnonzero(np.diff(piece)) + 1)):
+        middle = int(own[len(own) // 2])
         middles.append(middle)
         local = [apply(inverse(poses[middle]) @ poses[k], points(int(k))) for k in own]
-        if not local:
-            continue
         closure = finder.get_best_closure(number, np.concatenate(local))
         earlier = middles[closure.source_id] if closure.source_id < number else middle
         far = way[middle] - way[earlier] >= settings["loop_min_way_m"]

@@ -97,14 +97,14 @@ class LoopVerifier:
         drift_m : how far the nodes' relative position may be wrong. Beyond a metre, places on a grid as wide
         are tried and the best wins: a street seen along itself fits almost everywhere.
         """
-        guess = inverse(poses[first]) @ poses[second]
-        if drift_m > 1.0:
-            guess = self._search(self._map_around(poses, first), self._points(second), guess, drift_m)
-        return self.verify_at(poses, first, second, guess)
+        return self.verify_at(poses, first, second, inverse(poses[first]) @ poses[second], drift_m)
 
-    def verify_at(self, poses: Array, first: int, second: int, guess: Array) -> Loop:
-        """Prove that `second` lies at about `guess` (4, 4) in the frame of `first`."""
-        grid, points = self._map_around(poses, first), self._points(second)
+    def verify_at(self, poses: Array, first: int, second: int, guess: Array, drift_m: float = 0.0) -> Loop:
+        """Prove that `second` lies at about `guess` (4, 4) in the frame of `first`; see `verify`."""
+        grid, leaf = self._map_around(poses, first), self._settings["scan_leaf_m"]
+        points = np.asarray(voxel_means(self._store.points(second), leaf))
+        if drift_m > 1.0:
+            guess = self._search(grid, points, guess, drift_m)
         found = grid.register(points, guess, iterations=30, widen=WIDEN)
         fraction = found.inlier_fraction / max(found.known_fraction, 1e-9)
         accepted = (
@@ -113,9 +113,6 @@ class LoopVerifier:
             and float(np.linalg.eigvalsh(found.information)[0]) > 1.0 / self._settings["loop_sigma"] ** 2
         )
         return Loop(first, second, found, fraction, accepted)
-
-    def _points(self, k: int) -> Array:
-        return np.asarray(voxel_means(self._store.points(k), self._settings["scan_leaf_m"]))
 
     def _search(self, grid: PlaneMap, points: Array, guess: Array, drift_m: float) -> Array:
         """The best of many starts; both passes are on the road, so neither height nor tilt is searched."""
