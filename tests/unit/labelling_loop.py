@@ -42,17 +42,21 @@ def label_row(frame: int, name: str, column: int, row: int, shift_px: float = 0.
     }
 
 
+def labels_of(drive: str) -> list[dict[str, Any]]:
+    """Labels of all frames of a drive, in order."""
+    return [label_row(frame, *cell) for frame in range(FRAMES) for cell in cells(drive, frame)]
+
+
 def make_loop(work: Path) -> Path:
     """Results of both drives, all frames labelled; the detector finds every irregularity."""
     for drive in DRIVES:
         folder = work / "results" / drive
-        frames, images, labels = [], [], []
+        frames, images = [], []
         for frame in range(FRAMES):
             t_ns = 1_000_000 + frame
             picture = np.full((SIZE[1], SIZE[0], 3), 90, np.uint8)
             for name, column, row in cells(drive, frame):
                 picture[row * CELL : (row + 1) * CELL, column * CELL : (column + 1) * CELL] = COLOURS[name]
-                labels.append(label_row(frame, name, column, row))
             path = folder / "anonymized" / "camera_left" / f"{t_ns}.jpg"
             path.parent.mkdir(parents=True, exist_ok=True)
             Image.fromarray(picture).save(path, quality=95)
@@ -69,7 +73,7 @@ def make_loop(work: Path) -> Path:
             )
         write_table(folder / "frames.parquet", columns("frames", frames), "frames")
         write_table(folder / "anonymized" / "images.parquet", columns("images", images), "images")
-        write_labels(folder, labels)
+        write_labels(folder, labels_of(drive))
         size = {"camera_left_width_px": SIZE[0], "camera_left_height_px": SIZE[1]}
         write_report(folder / "ingest.report.json", stage="ingest", settings={}, inputs={}, counts=size)
     write_block_detector(work / "blocks.onnx")

@@ -8,11 +8,9 @@ import pytest
 import yaml
 from labelling_loop import (
     ANNOTATIONS,
-    FRAMES,
     PROPOSALS,
-    cells,
     detect,
-    label_row,
+    labels_of,
     make_loop,
     write_labels,
 )
@@ -55,7 +53,7 @@ def test_what_is_exported_can_be_imported_as_it_is(work, tmp_path, form):
     sample = read_sample(work / "sample.tsv")
     folder = work / "results" / "drive_a"
     rest = [row.frame for row in sample if row.sequence == "drive_a" and row.part == "rest"]
-    labels = [label_row(frame, *cell) for frame in range(FRAMES) for cell in cells("drive_a", frame)]
+    labels = labels_of("drive_a")
     unseen = tuple(rest[2:])
     write_labels(folder, [row for row in labels if row["frame"] not in unseen], unseen)
     try:
@@ -109,7 +107,7 @@ def test_training_waits_for_the_whole_seed(work, tmp_path):
     sample = read_sample(work / "sample.tsv")
     folder = work / "results" / "drive_a"
     seed = [row.frame for row in sample if row.sequence == "drive_a" and row.part == "seed"]
-    labels = [label_row(frame, *cell) for frame in range(FRAMES) for cell in cells("drive_a", frame)]
+    labels = labels_of("drive_a")
     write_labels(folder, [row for row in labels if row["frame"] != seed[1]], (seed[1],))
     try:
         with pytest.raises(CardError, match=rf"drive_a: .*not reviewed \(found 1, the first is {seed[1]}"):

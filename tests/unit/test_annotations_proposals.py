@@ -14,6 +14,7 @@ from labelling_loop import (
     cells,
     detect,
     label_row,
+    labels_of,
     make_loop,
     write_labels,
 )
@@ -88,7 +89,7 @@ def test_review_tells_accepted_moved_deleted_and_added(work):
             gates=[],
         )
     finally:
-        labels = [label_row(frame, *cell) for frame in range(FRAMES) for cell in cells("drive_a", frame)]
+        labels = labels_of("drive_a")
         write_labels(folder, labels)
     table = read_table(folder / "detections" / "random-review.parquet", "proposal_review").to_pylist()
     outcomes = {frame: Counter(r["outcome"] for r in table if r["frame"] == frame) for frame in rest}
