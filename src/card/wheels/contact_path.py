@@ -73,11 +73,7 @@ class ContactPath:
 
     def _knots(self, run: int) -> tuple[int, int]:
         # Runs are numbered along the path.
-        first, last = (
-            np.searchsorted(self.run, run, side="left"),
-            np.searchsorted(self.run, run, side="right"),
-        )
-        return int(first), int(last)
+        return int(self.run.searchsorted(run)), int(self.run.searchsorted(run, side="right"))
 
     def surface(self, arc: ArrayLike, height: ArrayLike) -> Array:
         """Points (..., 3) in world at arc lengths (...) and heights (...) over the path, both metres.

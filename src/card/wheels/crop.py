@@ -54,7 +54,7 @@ def crop_burst(
     times = np.linspace(0, burst.end_ns - burst.t_ns, LOOKS).astype(np.int64) + burst.t_ns
     lidar_from_world = inverse(trajectory.at(times) @ rig_from_lidar)
     seen = np.concatenate([apply(look, track)[:, :2] for look in lidar_from_world])
-    near = np.flatnonzero(near_cells(burst.points, seen, CELL_M))
+    near = near_cells(burst.points, seen, CELL_M)
     return replace(
         burst,
         points=burst.points[near],

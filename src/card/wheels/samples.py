@@ -77,15 +77,20 @@ class Cutter:
 
     def cut(self, bursts: Sequence[BurstFile]) -> list[RoadPoints]:
         """Each wheel's corridor points of the bursts."""
-        pieces: list[list[RoadPoints]] = [[] for _ in self.paths]
+        found: list[list[tuple[RoadPoints, Array]]] = [[] for _ in self.paths]
         arcs = np.stack([path.arc_at([entry.t_start_ns for entry in bursts]) for path in self.paths], axis=1)
         for entry, arc in zip(bursts, arcs.tolist(), strict=True):
             windows = [(at - self.arc_window_m, at + self.arc_window_m) for at in arc]
             points = self._near_points(entry, windows)
-            for piece, path, window in zip(pieces, self.paths, windows, strict=True):
+            for pieces, path, window in zip(found, self.paths, windows, strict=True):
                 road, which = corridor_points(points, path, window, self.corridor)
-                piece.append(road.part(self.static.near(points[which], self.static_reach)))
-        return [RoadPoints.joined(piece) for piece in pieces]
+                pieces.append((road, points[which]))
+        return [self._static(pieces) for pieces in found]
+
+    def _static(self, pieces: Sequence[tuple[RoadPoints, Array]]) -> RoadPoints:
+        """Those of one wheel's points, given in world too, that lie in or near the static voxels."""
+        road, world = zip(*pieces, strict=True)
+        return RoadPoints.joined(road).part(self.static.near(np.concatenate(world), self.static_reach))
 
     def _near_points(self, entry: BurstFile, windows: Sequence[tuple[float, float]]) -> Array:
         """World points (P, 3) of a burst near the paths."""
