@@ -7,7 +7,7 @@ from scipy.interpolate import BSpline
 from scipy.optimize import least_squares
 
 from card.artifacts import default_settings
-from card.wheels.normal_equations import NormalEquations, uniform_basis
+from card.wheels.normal_equations import RIDGE, NormalEquations, uniform_basis
 from card.wheels.profile import Profile, SplineSettings, fit_profile, tukey_weights
 
 Array = NDArray[np.float64]
@@ -92,15 +92,47 @@ def design_matrix(arc: Array, profile: Profile) -> Array:
     return BSpline.design_matrix(arc, knots, 3).toarray()
 
 
-def test_compiled_sums_agree_with_plain_ones_to_the_bit() -> None:
+def test_compiled_and_plain_fits_agree_to_the_bit() -> None:
+    """Sums in machine code by sums in numpy; and a solution where something moved by one from scratch, over
+    a hole in the points and clusters that keep some places moving for long."""
     rng = np.random.default_rng(5)
-    arc, sideways = np.sort(rng.uniform(0, 30, 5000)), rng.uniform(-0.12, 0.12, 5000)
-    height = bump(arc) + rng.normal(0, 0.01, arc.size)
+    arc = np.sort(np.concatenate([rng.uniform(0, 30, 5000), rng.uniform(34, 60, 4000)]))
+    sideways, height = rng.uniform(-0.12, 0.12, arc.size), bump(arc) + rng.normal(0, 0.01, arc.size)
+    cluster = (arc % 11 > 10) & (rng.uniform(size=arc.size) < 0.5)
+    height[cluster] += 0.07
     fast, slow = (fit_profile(arc, sideways, height, settings(), compiled=way) for way in (True, False))
     np.testing.assert_array_equal(fast[0].coefficients, slow[0].coefficients)
     np.testing.assert_array_equal(fast[0].variance, slow[0].variance)
     np.testing.assert_array_equal(fast[1], slow[1])
     np.testing.assert_array_equal(fast[2], slow[2])
+
+
+def test_solutions_are_those_of_the_dense_equations() -> None:
+    """The first one, one with weights changed in the middle, and one with other penalties."""
+    rng = np.random.default_rng(8)
+    arc, across = np.sort(rng.uniform(0, 12, 900)), rng.uniform(-1, 1, 900)
+    weight, height = rng.uniform(0, 1, arc.size), rng.normal(0, 0.1, arc.size)
+    count = 124
+    along = design_matrix(arc, Profile(-0.1, 0.1, np.zeros((count, 2)), np.zeros((count, 4))))
+    design = np.hstack([along, along * across[:, None]])
+    second = np.diff(np.eye(count), 2, axis=0)
+    equations = NormalEquations(arc, across, height, -0.1, 0.1, count, True)
+    intervals = np.ones(count - 3, dtype=bool)
+    for penalties in ((0.02, 1.0), (0.02, 1.0), (0.5, 3.0)):
+        equations.weigh(weight[equations.points(intervals)], intervals)
+        normal = design.T @ (weight[:, None] * design) + RIDGE * np.eye(2 * count)
+        normal[:count, :count] += penalties[0] * second.T @ second
+        normal[count:, count:] += penalties[1] * np.eye(count)
+        wanted = np.linalg.solve(normal, design.T @ (weight * height)).reshape(2, count).T
+        found = equations.solve(*penalties)
+        np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-10)
+        intervals[:] = False
+        intervals[40:43] = True
+        weight[equations.points(intervals)] = 0.3
+    weight[:] = -1.0
+    equations.weigh(weight[equations.points(intervals)], intervals)
+    with pytest.raises(np.linalg.LinAlgError, match="not positive definite"):
+        equations.solve(0.02, 1.0)
 
 
 def test_variance_is_that_of_the_inverse() -> None:
@@ -109,7 +141,8 @@ def test_variance_is_that_of_the_inverse() -> None:
     weight = rng.uniform(0, 1, arc.size)
     equations = NormalEquations(arc, across, np.zeros(arc.size), -0.1, 0.1, 34, True)
     equations.weigh(weight, np.ones(31, dtype=bool))
-    variance = equations.variance(0.01, 1.0)
+    equations.solve(0.01, 1.0)
+    variance = equations.variance()
     profile = Profile(-0.1, 0.1, np.zeros((34, 2)), variance)
     along = design_matrix(arc, profile)
     design = np.hstack([along, along * across[:, None]])

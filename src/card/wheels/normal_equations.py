@@ -1,10 +1,10 @@
 """Normal equations of the two splines of a profile: banded, summed up interval by interval."""
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import cholesky_banded, solveh_banded
 
-from card.wheels import spline_kernels
+from card.wheels import banded_kernels, spline_kernels
 
 Array = NDArray[np.float64]
 #: Keeps a piece of spline that no point touches solvable; far below what a single point weighs.
@@ -47,8 +47,13 @@ class NormalEquations:
         self._kernels = spline_kernels if compiled else PlainKernels
         #: Where the points of each interval begin, and where the last ones end.
         self._begin = np.searchsorted(self._first, np.arange(count - 2))
-        self._products = np.zeros((3, 10, count - 3))
-        self._right = np.zeros((2, 4, count - 3))
+        self._products, self._sums = np.zeros((3, 10, count - 3)), np.zeros((2, 4, count - 3))
+        self._band, self._factor = np.zeros((2 * count, BAND)), np.zeros((2 * count, BAND))
+        self._right, self._forward, self._solution = np.zeros((3, 2 * count))
+        self._compiled = compiled
+        #: The intervals weighed since, and the penalties of, the last solution.
+        self._weighed: NDArray[np.bool_] = np.ones(count - 3, dtype=np.bool_)
+        self._penalties: tuple[float, float] | None = None
 
     def points(self, intervals: NDArray[np.bool_]) -> NDArray[np.int64] | slice:
         """The points that lie in the chosen ones (K - 3,) of the knot intervals."""
@@ -63,7 +68,13 @@ class NormalEquations:
         among_chosen = np.cumsum(intervals) - 1
         points = (among_chosen[first], basis, across, height, weights)
         sums = self._kernels.sums(*points, int(np.count_nonzero(intervals)))
-        self._products[..., intervals], self._right[..., intervals] = sums
+        self._products[..., intervals], self._sums[..., intervals] = sums
+        self._weighed |= intervals
+
+    def moved(self, coefficients: Array, before: Array, tolerance_m: float) -> NDArray[np.bool_]:
+        """The intervals (K - 3,) whose alive coefficients differ from those before (K - 3, 2, 4)."""
+        found: NDArray[np.bool_] = self._kernels.moved(coefficients, before, tolerance_m)
+        return found
 
     def residual(self, coefficients: Array, chosen: NDArray[np.int64] | slice) -> Array:
         """Heights (P,) of the chosen points over the splines of coefficients (K, 2)."""
@@ -74,47 +85,33 @@ class NormalEquations:
         return self._first[chosen], self._basis[chosen], self._across[chosen], self._height[chosen]
 
     def solve(self, penalty: float, tilt_penalty: float) -> Array:
-        """Coefficients (K, 2)."""
-        right = np.zeros((self._count, 2))
-        for m in range(2):
-            for a in range(4):
-                right[a : a + self._count - 3, m] += self._right[m, a]
-        band = self._band(penalty, tilt_penalty)
-        solution = solveh_banded(
-            band, right.ravel(), lower=True, overwrite_ab=True, overwrite_b=True, check_finite=False
+        """Coefficients (K, 2).
+
+        Raises
+        ------
+        LinAlgError
+            If the weights are no weights, so that the equations are not positive definite.
+        """
+        if not self._compiled or (penalty, tilt_penalty) != self._penalties:
+            self._weighed[:] = True
+        sums = self._products, self._sums
+        written = banded_kernels.assemble(
+            *sums, penalty, tilt_penalty, RIDGE, self._weighed, self._band, self._right
         )
-        return np.asarray(solution, dtype=np.float64).reshape(self._count, 2)
+        self._penalties, self._weighed[:] = (penalty, tilt_penalty), False
+        changed = written.copy()
+        if not banded_kernels.factorize(self._band, changed, self._factor):
+            raise np.linalg.LinAlgError("normal equations are not positive definite")
+        banded_kernels.substitute(self._factor, self._right, written, changed, self._forward, self._solution)
+        return self._solution.reshape(self._count, 2).copy()
 
-    def variance(self, penalty: float, tilt_penalty: float) -> Array:
-        """Covariances (K, 4) of the elevation's coefficients with themselves and the next three."""
-        factor = cholesky_banded(self._band(penalty, tilt_penalty), lower=True, overwrite_ab=True)
-        return np.ascontiguousarray(spline_kernels.banded_inverse(factor)[::2, ::2])
-
-    def _band(self, penalty: float, tilt_penalty: float) -> Array:
-        """Lower band (8, 2 K) of the sums, the penalties and the ridge."""
-        count, pieces = self._count, self._count - 3
-        band = np.zeros((BAND, count, 2))
-        pair = 0
-        for a in range(4):
-            for b in range(a, 4):
-                low, offset = slice(a, a + pieces), 2 * (b - a)
-                band[offset, low, 0] += self._products[0, pair]
-                band[offset + 1, low, 0] += self._products[1, pair]
-                if b > a:
-                    band[offset - 1, low, 1] += self._products[1, pair]
-                band[offset, low, 1] += self._products[2, pair]
-                pair += 1
-        difference = (1.0, -2.0, 1.0)
-        for a in range(3):
-            for b in range(a, 3):
-                band[2 * (b - a), a : a + count - 2, 0] += penalty * difference[a] * difference[b]
-        band[0, :, 1] += tilt_penalty
-        band[0] += RIDGE
-        return band.reshape(BAND, 2 * count)
+    def variance(self) -> Array:
+        """Covariances (K, 4) of the last elevation coefficients with themselves and the next three."""
+        return np.ascontiguousarray(banded_kernels.inverse(self._factor)[::2, ::2])
 
 
 class PlainKernels:
-    """The sums of `spline_kernels` in numpy, in the same order: what the compiled form is held to."""
+    """`spline_kernels` in numpy, in the same order: what the compiled form is held to."""
 
     @staticmethod
     def residual(
@@ -145,3 +142,9 @@ class PlainKernels:
                     both = both * across
                 pair += 1
         return products, right
+
+    @staticmethod
+    def moved(coefficients: Array, before: Array, tolerance_m: float) -> NDArray[np.bool_]:
+        """See `spline_kernels.moved`."""
+        alive = sliding_window_view(coefficients, 4, axis=0)
+        return np.asarray((np.abs(alive - before) >= tolerance_m).any(axis=(1, 2)))

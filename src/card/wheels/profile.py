@@ -124,7 +124,7 @@ def fit_profile(
         alive = sliding_window_view(coefficients, 4, axis=0)
         if scale == settings.tukey_m:
             # Most of a drive is at rest long before the last place where two surfaces vie.
-            moving = np.asarray((np.abs(alive - weighed) >= CONVERGED_M).any(axis=(1, 2)))
+            moving = equations.moved(coefficients, weighed, CONVERGED_M)
             if not moving.any():
                 break
         scale = max(scale * settings.anneal_factor, settings.tukey_m)
@@ -132,6 +132,5 @@ def fit_profile(
         residual = equations.residual(coefficients, equations.points(moving))
         equations.weigh(tukey_weights(residual, scale), moving)
     residual = equations.residual(coefficients, equations.points(everywhere))
-    variance = equations.variance(settings.penalty, settings.tilt_penalty)
-    profile = Profile(start, spacing, coefficients, variance)
+    profile = Profile(start, spacing, coefficients, equations.variance())
     return profile, residual, tukey_weights(residual, settings.tukey_m)

@@ -53,20 +53,13 @@ def sums(first: Any, basis: Any, across: Any, height: Any, weights: Any, pieces:
 
 
 @_compiled
-def banded_inverse(factor: Any) -> Any:
-    """The entries (n, b) of the inverse of a banded matrix that lie in its lower band, b diagonals wide.
-
-    factor : (b, n) its lower Cholesky factor in LAPACK's band storage. Entry (j, i) of the result is element
-    (j + i, j) of the inverse. Takahashi's recurrence, from the last column to the first.
-    """
-    width, n = factor.shape
-    inverse = np.zeros((n, width))
-    for j in range(n - 1, -1, -1):
-        last = min(width - 1, n - 1 - j)
-        for i in range(last, -1, -1):
-            total = 1.0 / factor[0, j] if i == 0 else 0.0
-            for k in range(1, last + 1):
-                low, high = min(i, k), max(i, k)
-                total -= factor[k, j] * inverse[j + low, high - low]
-            inverse[j, i] = total / factor[0, j]
-    return inverse
+def moved(coefficients: Any, before: Any, tolerance_m: float) -> Any:
+    """Whether the four coefficients (K, 2) alive in an interval differ from those before (P, 2, 4), by a
+    tolerance or more in any, (P,)."""
+    found = np.zeros(len(before), dtype=np.bool_)
+    for i in range(len(before)):
+        for k in range(4):
+            for m in range(2):
+                if np.abs(coefficients[i + k, m] - before[i, m, k]) >= tolerance_m:
+                    found[i] = True
+    return found
