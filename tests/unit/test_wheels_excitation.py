@@ -238,6 +238,8 @@ def test_compiled_and_plain_static_voxels_are_the_same(reach: int, count: int) -
     points = rng.uniform(-1, 1.4, (3000, 3))
     found = voxels.near(points, reach)
     np.testing.assert_array_equal(found, voxels.near(points, reach, compiled=False))
+    voxel = np.floor((points - [0.1, 0, 0]) / 0.1)
+    np.testing.assert_array_equal(found, (np.abs(voxel[:, None] - ids).max(axis=2) <= reach).any(axis=1))
     assert found.any() == (count > 0)
 
 

@@ -106,6 +106,25 @@ def test_standing_adds_no_arc_length() -> None:
     assert set(path.run) == {0}
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_knots_are_a_step_apart(seed: int) -> None:
+    """Against the plain loop, for a car that creeps, stands and drives, and ends in the middle of a step."""
+    rng = np.random.default_rng(seed)
+    along = np.cumsum(
+        np.repeat(rng.uniform(0, 0.08, 40) * (rng.uniform(size=40) > 0.3), rng.integers(1, 30, 40))
+    )
+    path = contact_path(trajectory(along, heave=0.01 * np.sin(np.arange(len(along)))), CONTACT, STEP_M)
+    wanted = [0]
+    for i, point in enumerate(path.position):
+        if np.linalg.norm(point - path.position[wanted[-1]]) >= STEP_M:
+            wanted.append(i)
+    last = len(along) - 1
+    if np.linalg.norm(path.position[last] - path.position[wanted[-2]]) >= STEP_M:
+        wanted[-1] = last
+    assert 30 < len(wanted) < len(along)
+    np.testing.assert_array_equal(path.knots, wanted)
+
+
 def test_a_car_that_never_moves_has_a_path() -> None:
     path = contact_path(trajectory(np.zeros(50)), CONTACT, STEP_M)
     excitation = fit(path, RoadPoints.joined([]))

@@ -63,7 +63,7 @@ def test_a_burst_that_is_cropped_keeps_its_own_end(tmp_path: Path, deskewed: boo
         corridor,
         12.0,
     )
-    burst = BurstFile("lidar_front", t_ns, 1, tmp_path / f"{t_ns}.laz")
+    burst = BurstFile("lidar_front", t_ns, 1, f"{tmp_path}/{t_ns}.laz")
     (found,) = collect_samples([burst], cutter, threads=1)
     wanted, _ = corridor_points(world, contact, (0.0, 30.0), corridor)
     assert len(wanted) == 200
@@ -95,7 +95,7 @@ def test_cut_points_are_those_of_the_plain_way(tmp_path: Path) -> None:
     paths = [contact_path(path, contact, 0.05) for contact in ([0.8, 1.0, -1.7], [-0.8, -1.5, -1.7])]
     lidar = Lidar(rig_from_lidar, corrections, False)
     cutter = Cutter({"lidar_front": lidar}, path, paths, static, 1, corridor, reach_m)
-    found = cutter.cut([BurstFile("lidar_front", t_ns, 1, tmp_path / f"{t_ns}.laz")])
+    found = cutter.cut([BurstFile("lidar_front", t_ns, 1, f"{tmp_path}/{t_ns}.laz")])
 
     points = deskew_plain(read_burst(tmp_path / f"{t_ns}.laz"), rig_from_lidar, path, corrections)
     points = points[static.near(points, 1)]
@@ -127,7 +127,7 @@ def test_bursts_are_as_far_apart_as_their_points_reach(points: int, step_m: floa
         Trajectory(START_NS + np.round(t * 1e9).astype(np.int64), position, still), [0.8, 1.0, -1.7], 0.05
     )
     bursts = [
-        BurstFile(lidar, START_NS + number * 100_000_000, points, Path("b"))
+        BurstFile(lidar, START_NS + number * 100_000_000, points, "b")
         for number in range(78)
         for lidar in ("lidar_front", "lidar_rear")
     ]

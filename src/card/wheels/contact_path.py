@@ -1,6 +1,5 @@
 """The path of a wheel's contact point if the wheel were rigidly fixed to the rig."""
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -8,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from card.geometry import Trajectory, apply, matrix_from_quaternion, transform
+from card.wheels import path_kernels
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -98,7 +98,7 @@ def contact_path(trajectory: Trajectory, contact_rig: ArrayLike, min_step_m: flo
     points = np.broadcast_to(np.asarray(contact_rig, dtype=np.float64), (len(trajectory.t_ns), 3))
     position = apply(world_from_rig, points)
     rotation = matrix_from_quaternion(trajectory.rotation_wxyz)
-    knots = _knots(position, min_step_m)
+    knots = path_kernels.knots(position, min_step_m)
     steps = np.diff(position[knots], axis=0)
     lengths = np.linalg.norm(steps, axis=1)
     knot_arc = np.concatenate([[0.0], np.cumsum(lengths)])
@@ -108,19 +108,6 @@ def contact_path(trajectory: Trajectory, contact_rig: ArrayLike, min_step_m: flo
     segment = np.clip(segment, 0, max(len(knots) - 2, 0))
     arc = _arc(position, knots, knot_arc, segment, run)
     return ContactPath(trajectory.t_ns, position, rotation, knots, knot_arc, arc, segment, run)
-
-
-def _knots(position: Array, min_step_m: float) -> Indices:
-    points = position.tolist()
-    kept, last = [0], points[0]
-    for i, point in enumerate(points):
-        if math.dist(point, last) >= min_step_m:
-            kept.append(i)
-            last = point
-    # The rest after the last knot is shorter than a step: the last segment takes it in.
-    if len(kept) > 1 and math.dist(points[-1], points[kept[-2]]) >= min_step_m:
-        kept[-1] = len(points) - 1
-    return np.array(kept, dtype=np.int64)
 
 
 def _arc(position: Array, knots: Indices, knot_arc: Array, segment: Indices, run: Indices) -> Array:

@@ -119,26 +119,3 @@ def _local(p: Any, position: Any, rotation: Any, i: int, alpha: float, axis: int
         start += rotation[i - 1, j, axis] * (p[j] - position[i - 1, j])
         end += rotation[i, j, axis] * (p[j] - position[i, j])
     return (1 - alpha) * start + alpha * end
-
-
-@_compiled
-def any_among(voxel: Any, steps: Any, extent: Any, keys: Any) -> Any:
-    """Whether a voxel (N, 3) moved by any of the steps (S, 3) lies in the extent and is among the keys."""
-    found = np.zeros(len(voxel), dtype=np.bool_)
-    for n in range(len(voxel)):
-        for s in range(len(steps)):
-            i, j, k = voxel[n, 0] + steps[s, 0], voxel[n, 1] + steps[s, 1], voxel[n, 2] + steps[s, 2]
-            if not (0 <= i < extent[0] and 0 <= j < extent[1] and 0 <= k < extent[2]):
-                continue
-            key = (i * extent[1] + j) * extent[2] + k
-            low, high = 0, len(keys)
-            while low < high:
-                middle = (low + high) // 2
-                if keys[middle] < key:
-                    low = middle + 1
-                else:
-                    high = middle
-            if low < len(keys) and keys[low] == key:
-                found[n] = True
-                break
-    return found

@@ -128,7 +128,7 @@ def _burst_files(bursts: Path, recording: Path) -> list[BurstFile]:
     table = read_table(bursts, "bursts")
     columns = (table[name].to_pylist() for name in ("lidar", "t_start_ns", "points", "file"))
     files = [
-        BurstFile(lidar, t_ns, points, recording / file)
+        BurstFile(lidar, t_ns, points, f"{recording}/{file}")
         for lidar, t_ns, points, file in zip(*columns, strict=True)
     ]
     return sorted(files, key=lambda file: (file.t_start_ns, file.lidar))

@@ -40,7 +40,7 @@ class BurstFile:
     lidar: str
     t_start_ns: int
     points: int
-    file: Path
+    file: str
 
 
 def spaced_bursts(
@@ -95,7 +95,7 @@ class Cutter:
     def _near_points(self, entry: BurstFile, windows: Sequence[tuple[float, float]]) -> Array:
         """World points (P, 3) of a burst near the paths."""
         lidar = self.lidars[entry.lidar]
-        whole = read_burst(entry.file, intensity=False)
+        whole = read_burst(Path(entry.file), intensity=False)
         burst = crop_burst(whole, lidar.rig_from_lidar, self.trajectory, self._tracks, windows)
         return deskew_burst(
             burst,

@@ -1,13 +1,13 @@
 """Which points lie in the static voxels of a sequence."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from functools import cache
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from card.wheels.corridor_kernels import any_among
+from card.wheels import voxel_kernels
 
 Array = NDArray[np.float64]
 
@@ -25,13 +25,12 @@ class StaticVoxels:
     def __init__(self, arrays: Mapping[str, NDArray[np.generic]]) -> None:
         self._origin = np.asarray(arrays["origin"], dtype=np.float64)
         self._size = float(arrays["voxel_size"])
-        columns = np.asarray(arrays["ids"]).reshape(-1, 3).T
-        some = columns.shape[1] > 0
-        self._low = np.array([column.min() if some else 0 for column in columns], dtype=np.int64)
-        high = np.array([column.max() if some else -1 for column in columns], dtype=np.int64)
+        ids = np.asarray(arrays["ids"]).reshape(-1, 3)
+        some = len(ids) > 0
+        self._low = np.array([column.min() if some else 0 for column in ids.T], dtype=np.int64)
+        high = np.array([column.max() if some else -1 for column in ids.T], dtype=np.int64)
         self._extent = high - self._low + 1
-        pairs = zip(columns, self._low, strict=True)
-        keys = self._key(column.astype(np.int64) - low for column, low in pairs)
+        keys = np.asarray(voxel_kernels.keys(ids, self._low, self._extent))
         # Ten million are sorted in a second; as they are written they are in order.
         self._keys = keys if (keys[1:] > keys[:-1]).all() else np.sort(keys)
 
@@ -44,7 +43,7 @@ class StaticVoxels:
         voxel = np.floor((points - self._origin) / self._size).astype(np.int64) - self._low
         steps = _steps(reach)
         if compiled:
-            return np.asarray(any_among(voxel, steps, self._extent, self._keys))
+            return np.asarray(voxel_kernels.any_among(voxel, steps, self._extent, self._keys))
         found = np.zeros(len(points), dtype=bool)
         for step in steps:
             missing = np.flatnonzero(~found)
@@ -55,12 +54,8 @@ class StaticVoxels:
         within = np.all((voxel >= 0) & (voxel < self._extent), axis=1)
         if not within.any():
             return within
-        keys = self._key(voxel[within].T)
+        x, y, z = voxel[within].T
+        keys = (x * self._extent[1] + y) * self._extent[2] + z
         at = np.minimum(np.searchsorted(self._keys, keys), len(self._keys) - 1)
         within[within] = self._keys[at] == keys
         return within
-
-    def _key(self, columns: Iterable[NDArray[np.int64]]) -> NDArray[np.int64]:
-        """One number (N,) for each voxel; columns : three of (N,), from the lowest voxel."""
-        x, y, z = columns
-        return (x * self._extent[1] + y) * self._extent[2] + z
