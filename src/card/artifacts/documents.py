@@ -3,7 +3,7 @@
 import csv
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -18,10 +18,15 @@ _PLAIN = {str, int, float, bool, type(None)}
 
 def write_json(path: Path, document: Any, schema: str) -> None:
     """Write a document that fits ``schema``: UTF-8, sorted keys, no NaN or infinity."""
-    plain = _plain(document, path)
+    plain = _plain(document)
     check(plain, schema, path)
+    try:
+        text = json_text(plain)
+    except ValueError as error:
+        strange = next(number for number in _floats(plain) if not math.isfinite(number))
+        raise CardError("number is not finite", where=path, found=strange) from error
     with atomic_file(path) as partial:
-        partial.write_text(json_text(plain), encoding="utf-8")
+        partial.write_text(text, encoding="utf-8")
 
 
 def read_json(path: Path, schema: str) -> Any:
@@ -94,24 +99,29 @@ def _text(path: Path) -> str:
         raise CardError("not UTF-8", where=path, found=error.reason) from error
 
 
-def _plain(value: Any, path: Path) -> Any:
+def _plain(value: Any) -> Any:
     """Builtins of a value that may hold numpy scalars and arrays."""
     if isinstance(value, list) and _is_plain(value):
         return value
     if hasattr(value, "tolist"):
         value = value.tolist()
     if isinstance(value, Mapping):
-        return {str(key): _plain(item, path) for key, item in value.items()}
+        return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, Sequence) and not isinstance(value, str):
-        return [_plain(item, path) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        raise CardError("number is not finite", where=path, found=value)
+        return [_plain(item) for item in value]
     return value
 
 
 def _is_plain(values: list[Any]) -> bool:
-    """Whether a list, or the lists in it, hold builtins alone and no number that is not finite."""
-    flat = list(chain.from_iterable(values)) if set(map(type, values)) == {list} else values
-    if not set(map(type, flat)) <= _PLAIN:
-        return False
-    return all(math.isfinite(value) for value in flat if type(value) is float)
+    """Whether a list, or the lists in it, hold builtins alone."""
+    lists = set(map(type, values)) == {list}
+    return _PLAIN.issuperset(map(type, chain.from_iterable(values) if lists else values))
+
+
+def _floats(value: Any) -> Iterator[float]:
+    """The floats in a document of builtins."""
+    if isinstance(value, float):
+        yield value
+    elif isinstance(value, dict | list):
+        for item in value.values() if isinstance(value, dict) else value:
+            yield from _floats(item)
