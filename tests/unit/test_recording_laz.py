@@ -168,6 +168,25 @@ def test_points_that_are_not_finite_are_found_when_read(tmp_path: Path) -> None:
         read_burst(path)
 
 
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("ring", 32, r"ring that the sensor does not have \(found 32"),
+        ("offset_ns", MAX_BURST_NS + 1, "point times outside the burst"),
+    ],
+)
+def test_points_that_no_sensor_has_are_found_when_read(
+    tmp_path: Path, name: str, value: int, message: str
+) -> None:
+    path = tmp_path / f"{START_NS}.laz"
+    write_burst(path, burst(START_NS))
+    las = laspy.read(path)
+    las[name][117] = value
+    las.write(path)
+    with pytest.raises(CardError, match=message):
+        read_burst(path)
+
+
 @pytest.mark.parametrize("name", ["0012.laz", "12a.laz", "-5.laz", "1_0.laz", "²3.laz"])
 def test_names_are_time_stamps(tmp_path: Path, name: str) -> None:
     with pytest.raises(CardError, match="not a time stamp"):

@@ -18,6 +18,7 @@ import numpy.typing as npt
 from card.errors import CardError
 from card.recording.burst import MAX_BURST_NS, Burst
 from card.recording.hesai.packet import CHANNELS
+from card.recording.laz_kernels import unpack
 from card.recording.paths import stamp_of
 
 #: Metres a unit; the sensor's own unit is 4 mm, its noise some mm.
@@ -99,14 +100,11 @@ def read_burst(path: Path, *, intensity: bool = True) -> Burst:
     grey = records["intensity"] if intensity else np.zeros(count, dtype=np.uint8)
     if count and grey.max() > 255:
         raise CardError("intensity is not 8 bit", where=path, found=int(grey.max()), wanted="0 to 255")
-    burst = Burst(
-        t_ns=t_ns,
-        points=layout.points(records),
-        intensity=grey.astype(np.uint8),
-        ring=records["ring"].copy(),
-        offset_ns=records["offset_ns"].copy(),
-    )
-    _check(burst, path)
+    fields = (records[name] for name in ("X", "Y", "Z", *_EXTRA))
+    points, ring, offset_ns, (finite, last, late) = unpack(*fields, layout.scales, layout.offsets)
+    burst = Burst(t_ns, points, grey.astype(np.uint8), ring, offset_ns)
+    if not finite or last >= CHANNELS or late > MAX_BURST_NS:
+        _check(burst, path)
     return burst
 
 
@@ -134,13 +132,6 @@ class _Layout:
             wanted = lazrs.DecompressionSelection(_LAYERS | (_INTENSITY if intensity else 0))
             lazrs.LasZipDecompressor(source, self.laszip, wanted).decompress_many(found.view(np.uint8))
         return found
-
-    def points(self, records: npt.NDArray[np.void]) -> npt.NDArray[np.float64]:
-        """Their coordinates (N, 3), metres."""
-        points = np.empty((len(records), 3))
-        for axis, name in enumerate("XYZ"):
-            points[:, axis] = records[name] * self.scales[axis] + self.offsets[axis]
-        return points
 
 
 def _opened(raw: bytes) -> tuple[_Layout, int]:
