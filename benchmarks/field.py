@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from card.artifacts import atomic_folder, write_json
-from card.simulation.calibrations import delivered_calibration, true_calibration
+from card.simulation.calibrations import true_calibration
 from card.simulation.deliveries import write_trajectory
 from card.simulation.drives import drive_named
 from card.simulation.record import write_sweeps
@@ -19,15 +19,11 @@ from card.simulation.simulate import write_description, write_motion
 from card.simulation.world import world_of
 
 OUT = Path(__file__).resolve().parent / "out" / "field"
-VIEWS = 150  # board views the delivered calibration claims
 
 
 @dataclass(frozen=True)
 class Field:
-    """Folders of one drive: `recording` in the raw layout, `truth`, and two calibrations.
-
-    `calibration` is the true one, `delivered` has the errors of a good estimate.
-    """
+    """Folders of one drive, `recording` in the raw layout and `truth`, and its true calibration."""
 
     folder: Path
 
@@ -42,10 +38,6 @@ class Field:
     @property
     def calibration(self) -> Path:
         return self.folder / "calibration.json"
-
-    @property
-    def delivered(self) -> Path:
-        return self.folder / "delivered.json"
 
 
 def field_drive(drive: str, seed: int, seconds: float, out: Path = OUT, threads: int = 2) -> Field:
@@ -62,9 +54,7 @@ def field_drive(drive: str, seed: int, seconds: float, out: Path = OUT, threads:
             write_sweeps(world, field.recording, field.truth, threads)
             write_description(world, field.recording, cameras=())
             write_trajectory(field.recording, path, seed)
-            session = world.drive.session
-            write_json(field.calibration, true_calibration(session, seed, "full"), "calibration")
-            write_json(field.delivered, delivered_calibration(session, seed, "full", VIEWS), "calibration")
+            write_json(field.calibration, true_calibration(world.drive.session, seed, "full"), "calibration")
     return Field(folder)
 
 

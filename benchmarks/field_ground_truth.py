@@ -8,6 +8,7 @@ measured again.
 
 import argparse
 import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import cv2
@@ -123,6 +124,11 @@ def main() -> None:
             )
             of_drive.append(figures)
             print(drive, seed, {name: round(value, 3) for name, value in figures.items()}, flush=True)
+    show_medians(found)
+
+
+def show_medians(found: Mapping[str, Sequence[Mapping[str, float]]]) -> None:
+    """Print median and bad side of each figure of each drive over its seeds."""
     for drive, of_drive in found.items():
         for name in (name for name in FIGURES if name in of_drive[0]):
             values = np.array([figures[name] for figures in of_drive])

@@ -36,38 +36,42 @@ THREADS = 2
 AIMS = {"rear_deg": 0.005, "rear_mm": 1.0, "imu_deg": 0.02, "imu_mm": 6.0, "drive_cpu_s": 240.0}
 
 
-def drive_of(seed: int, out: Path) -> Path:
-    """The folder of a seed's drive, with the drawing and what boards tell of the front LiDAR."""
-    folder = out / f"{SESSION}-{seed}"
+def drive_of(session: str, seed: int, out: Path) -> Path:
+    """The folder of the drive of a car's session, with the drawing; simulated if it is not there."""
+    folder = out / f"{session}-{seed}"
     if not folder.is_dir():
-        rig = session_rig(SESSION, seed, SCALE)
         with atomic_folder(folder) as partial:
             ways = {"folder": partial / "drive", "truth": partial / "truth"}
-            write_session_drive(SESSION, **ways, scale=SCALE, seed=seed, threads=THREADS)
+            write_session_drive(session, **ways, scale=SCALE, seed=seed, threads=THREADS)
             write_drawing(partial / "drawing.json", SCALE)
-            boards = front_lidar_document(
-                rig.lidar_corrections["lidar_front"], RANGE_SIGMA_M, np.random.default_rng([seed, 6])
-            )
-            write_json(partial / "front_lidar.json", boards, "front_lidar_calibration")
     return folder
 
 
-def estimated(folder: Path) -> tuple[dict[str, Any], float]:
-    """What the stage finds, and its CPU time, s."""
-    result, taken = folder / "rear_and_imu.json", folder / "cpu_s.json"
+def calibrate(folder: Path, front_lidar: Path, result: Path) -> None:
+    """The stage with a drive of `drive_of` and what boards tell of the front LiDAR; writes `result`."""
+    calibrate_rear_and_imu(
+        drive=folder / "drive",
+        front_lidar=front_lidar,
+        drawing=folder / "drawing.json",
+        rear_and_imu=result,
+        report=result.with_suffix(".report.json"),
+        settings=default_settings("calibration"),
+        odometry_settings=default_settings("odometry"),
+        gates=[],
+        threads=THREADS,
+    )
+
+
+def estimated(seed: int, out: Path) -> tuple[dict[str, Any], float]:
+    """What the stage finds of a seed's drive if boards tell little, and its CPU time, s."""
+    folder = drive_of(SESSION, seed, out)
+    result, taken, boards = (folder / f"{n}.json" for n in ("rear_and_imu", "cpu_s", "front_lidar"))
     if not taken.is_file():
+        true = session_rig(SESSION, seed, SCALE).lidar_corrections["lidar_front"]
+        known = front_lidar_document(true, RANGE_SIGMA_M, np.random.default_rng([seed, 6]))
+        write_json(boards, known, "front_lidar_calibration")
         start = time.process_time()
-        calibrate_rear_and_imu(
-            drive=folder / "drive",
-            front_lidar=folder / "front_lidar.json",
-            drawing=folder / "drawing.json",
-            rear_and_imu=result,
-            report=folder / "rear_and_imu.report.json",
-            settings=default_settings("calibration"),
-            odometry_settings=default_settings("odometry"),
-            gates=[],
-            threads=THREADS,
-        )
+        calibrate(folder, boards, result)
         taken.write_text(json.dumps(time.process_time() - start))
     return read_json(result, "rear_and_imu_calibration"), json.loads(taken.read_text())
 
@@ -101,7 +105,7 @@ def main() -> None:
     options = parser.parse_args()
     found = []
     for seed in range(1, options.seeds + 1):
-        document, seconds = estimated(drive_of(seed, options.out))
+        document, seconds = estimated(seed, options.out)
         found.append(errors_of(document, truth_of(seed)) | {"drive_cpu_s": seconds})
         print(seed, {figure: round(value, 4) for figure, value in found[-1].items()}, flush=True)
     rows: list[Row] = []
