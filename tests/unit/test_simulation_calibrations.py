@@ -14,8 +14,12 @@ SENSORS = ("camera_left", "camera_right", "lidar_front", "lidar_rear")
 
 
 def _offset(a: dict, b: dict, sensor: str) -> np.ndarray:
-    """Translation (m) and rotation vector (rad) between two poses of a sensor, in the rig."""
-    one, other = (from_json(c["extrinsics"][f"rig_from_{sensor}"]) for c in (a, b))
+    """`_step` between two bundles' poses of a sensor in the rig."""
+    return _step(*(from_json(c["extrinsics"][f"rig_from_{sensor}"]) for c in (a, b)))
+
+
+def _step(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Translation (m) and rotation vector (rad) from one pose (4, 4) to another, in their target frame."""
     turn = other[:3, :3] @ one[:3, :3].T
     skew = 0.5 * (turn - turn.T)
     return np.concatenate([other[:3, 3] - one[:3, 3], [skew[2, 1], skew[0, 2], skew[1, 0]]])
@@ -69,19 +73,31 @@ def test_the_imu_is_undone_by_its_corrections_which_a_delivery_has_nearly_right(
     assert sigma[1, 2, 2] == pytest.approx(7e-4, rel=0.4)
 
 
-def test_stereo_is_known_far_better_than_each_camera() -> None:
+@pytest.mark.parametrize(
+    ("sensor", "against", "sigma_rad", "sigma_m"),
+    [
+        ("camera_left", "lidar_front", np.radians(0.0075), 3e-4),
+        ("lidar_rear", "lidar_front", np.radians(0.004), 1.5e-4),
+        ("camera_right", "camera_left", np.radians(0.003), 3e-4),
+    ],
+)
+def test_sensors_err_less_against_each_other_than_against_the_rig(
+    sensor: str, against: str, sigma_rad: float, sigma_m: float
+) -> None:
     errors = []
-    for seed in range(60):
-        relative = [
-            np.linalg.inv(from_json(c["extrinsics"]["rig_from_camera_left"]))
-            @ from_json(c["extrinsics"]["rig_from_camera_right"])
-            for c in (
-                true_calibration(START, seed, "tiny"),
-                delivered_calibration(START, seed, "tiny", views=3),
-            )
-        ]
-        errors.append(relative[1][:3, 3] - relative[0][:3, 3])
-    assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(3e-4, rel=0.25)
+    for seed in range(120):
+        truth, given = (
+            true_calibration(START, seed, "tiny"),
+            delivered_calibration(START, seed, "tiny", views=3),
+        )
+        one, other = (
+            {name: from_json(bundle["extrinsics"][f"rig_from_{name}"]) for name in (sensor, against)}
+            for bundle in (truth, given)
+        )
+        carried = other[against] @ np.linalg.inv(one[against]) @ one[sensor]
+        errors.append(_step(carried, other[sensor]))
+    rms = np.sqrt(np.mean(np.square(np.array(errors).reshape(-1, 2, 3)), axis=(0, 2)))
+    assert rms == pytest.approx([sigma_m, sigma_rad], rel=0.2)
 
 
 def test_a_name_that_is_no_session_is_refused() -> None:

@@ -31,11 +31,14 @@ _DRIFT_ANGLE_RAD = np.radians(0.003)
 _DRIFT_M = 1e-4
 _DRIFT_FOCAL = 3e-5
 
-# One sigma of a good estimate.
-_ANGLE_RAD = np.radians(0.01)
-_POSITION_M = 1e-3
-_STEREO_ANGLE_RAD = np.radians(0.003)
-_STEREO_M = 3e-4
+# One sigma of a good estimate. Sensors are measured one against another, not each against the rig: which,
+# against which (none: the rig), rad, m.
+_CHAIN: tuple[tuple[str, str | None, float, float], ...] = (
+    ("lidar_front", None, np.radians(0.01), 1e-3),
+    ("camera_left", "lidar_front", np.radians(0.0075), 3e-4),
+    ("lidar_rear", "lidar_front", np.radians(0.004), 1.5e-4),
+    ("camera_right", "camera_left", np.radians(0.003), 3e-4),
+)
 _FOCAL = 5e-5
 _CENTRE = 1e-4
 _DISTORTION = (3e-4, 3e-4, 2e-5, 2e-5, 1e-4)
@@ -98,21 +101,27 @@ def true_calibration(session: str, seed: int, scale: str) -> dict[str, Any]:
 def delivered_calibration(session: str, seed: int, scale: str, views: int) -> dict[str, Any]:
     """What the team estimated in a session of so many views: the truth with the error of a good estimate.
 
-    Cameras, front and rear LiDAR err together by 0.01 degrees and 1 mm against the rig; the right camera
-    errs against the left by 0.003 degrees and 0.3 mm; the covariances say so. A LiDAR's channels are known
-    to 1 mm and 0.005 degrees, the IMU as well as a session's drive tells.
+    The front LiDAR errs against the rig by 0.01 degrees and 1 mm an axis, and all other sensors with it.
+    Beyond that the left camera and the rear LiDAR err against it, and the right camera against the left, by
+    what calibration reaches at full scale; the covariances say so. A LiDAR's channels are known to 1 mm and
+    0.005 degrees, the IMU as well as a session's drive tells.
     """
     day, _ = day_of(session)
     rig = session_rig(session, seed, scale)
     rng = _rng(seed, session, 2)
-    rig_from = {
-        name: _disturbed(rig.rig_from[name], _ANGLE_RAD, _POSITION_M, rng)
-        for name in ("camera_left", "lidar_front", "lidar_rear")
-    }
-    left_error = rig_from["camera_left"] @ np.linalg.inv(rig.rig_from["camera_left"])
-    rig_from["camera_right"] = _disturbed(
-        left_error @ rig.rig_from["camera_right"], _STEREO_ANGLE_RAD, _STEREO_M, rng
-    )
+    rig_from: dict[str, Array] = {}
+    covariances: dict[str, Array] = {}
+    for name, base, angle_rad, distance_m in _CHAIN:
+        pose = rig.rig_from[name]
+        covariance = np.diag([distance_m**2] * 3 + [angle_rad**2] * 3)
+        if base is not None:
+            # The base's rotation swings what is measured against it about the base's place.
+            swing = np.eye(6)
+            swing[:3, 3:] = -_cross(pose[:3, 3] - rig.rig_from[base][:3, 3])
+            covariance += swing @ covariances[f"rig_from_{base}"] @ swing.T
+            pose = rig_from[base] @ np.linalg.inv(rig.rig_from[base]) @ pose
+        rig_from[name] = _disturbed(pose, angle_rad, distance_m, rng)
+        covariances[f"rig_from_{name}"] = covariance
     wheel_rng = _rng(seed, day, 3)  # the wheels are surveyed once a day
     noisy = Rig(
         cameras={name: _estimated_camera(rig.cameras[name], rng) for name in CAMERAS},
@@ -122,21 +131,12 @@ def delivered_calibration(session: str, seed: int, scale: str, views: int) -> di
         lidar_corrections={name: _estimated_lidar(c, wheel_rng) for name, c in rig.lidar_corrections.items()},
         imu=_estimated_imu(rig.imu, _rng(seed, session, 4)),
     )
-    covariance = np.diag([_POSITION_M**2] * 3 + [_ANGLE_RAD**2] * 3)
-    stereo = np.diag([_STEREO_M**2] * 3 + [_STEREO_ANGLE_RAD**2] * 3)
-    # The left camera's rotation swings the right one about the left camera's lever to the rig.
-    swing = np.eye(6)
-    swing[:3, 3:] = -_cross(rig.rig_from["camera_right"][:3, 3] - rig.rig_from["camera_left"][:3, 3])
-    covariances = {
-        f"rig_from_{name}": covariance.tolist() for name in ("camera_left", "lidar_front", "lidar_rear")
-    }
-    covariances["rig_from_camera_right"] = (swing @ covariance @ swing.T + stereo).tolist()
     quality = {
         "stereo_reprojection_px": round(float(rng.uniform(0.15, 0.25)), 3),
         "board_plane_rms_m": round(float(rng.uniform(0.005, 0.007)), 4),
         "views": views,
     }
-    return _document(session, noisy, covariances, quality)
+    return _document(session, noisy, {name: c.tolist() for name, c in covariances.items()}, quality)
 
 
 def _document(session: str, rig: Rig, covariances: dict[str, Any], quality: dict[str, Any]) -> dict[str, Any]:
