@@ -128,20 +128,20 @@ def attached(
 def surrounded(keys: Index, dynamic: Mask, settings: Mapping[str, Any]) -> Mask:
     """Dynamic voxels (C,) and those they surround; `reference.attached` has the same, plainly.
 
-    A voxel is dynamic if of the voxels in the cube of 2 `near_voxels` + 1 round it `surrounded_voxels` or
-    more, and a share of `surrounded_share` or more, are. What joins may let others join.
+    A voxel is dynamic if of the voxels in the cube of 2 `near_voxels` + 1 round it one or more, and a share
+    of `surrounded_share` or more, are. What joins may let others join.
 
     keys : (C,) increasing.
     """
     dynamic, share = dynamic.copy(), settings["surrounded_share"]
     if not share:
         return dynamic
-    radius, least = settings["near_voxels"], settings["surrounded_voxels"]
+    radius = settings["near_voxels"]
     count = np.zeros(len(keys), dtype=np.int64)
     new = np.flatnonzero(dynamic)
     while len(new):
         count += _near(keys, keys[new], radius)
-        near = np.flatnonzero(~dynamic & (count >= least))
+        near = np.flatnonzero(~dynamic & (count > 0))
         others = sum(high - low for low, high in _columns(keys, keys[near], radius)) - 1
         new = near[count[near] >= share * others]
         dynamic[new] = True

@@ -39,7 +39,7 @@ def surrounded(keys: Index, dynamic: Mask, settings: Mapping[str, Any]) -> Mask:
     share = settings["surrounded_share"]
     while share:
         count = near[:, dynamic].sum(axis=1)
-        joins = ~dynamic & (count >= settings["surrounded_voxels"]) & (count >= share * others)
+        joins = ~dynamic & (count > 0) & (count >= share * others)
         if not joins.any():
             break
         dynamic = dynamic | joins
