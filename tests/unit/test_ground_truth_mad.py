@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from card.ground_truth.reference.mad import mad_inliers
-from card.ground_truth.reference.thinning import pixel_limit, thin
+from card.ground_truth.reference.thinning import pixels_covered, thin
 
 
 def points_at_radii(radii: list[float]) -> np.ndarray:
@@ -65,7 +65,39 @@ def test_each_voxel_has_a_limit_of_its_own():
     assert [int(kept[voxel == v].sum()) for v in range(3)] == [1, 2, 4]
 
 
-def test_a_voxel_keeps_a_point_for_so_many_pixels_that_it_covers():
-    # 10 cm at 10 m and a focal length of 1600 pixels: 16 by 16 of them.
-    depths = np.array([10.0, 20.0, 40.0, 500.0])
-    assert pixel_limit(depths, 0.1, 1600.0, 2.0).tolist() == [128, 32, 8, 1]
+def covered(points: np.ndarray, corners: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+    """Of clouds (V, N, 3), metres from their corners, seen with focal lengths of 1600 and 1500 pixels."""
+    voxel = np.repeat(np.arange(len(points)), points.shape[1]).astype(np.int32)
+    offset = points.reshape(-1, 3).astype(np.float32)
+    return pixels_covered(voxel, offset, corners, rotation, (1600.0, 1500.0), 0.5)
+
+
+def test_a_patch_covers_the_pixels_of_its_outline():
+    step = (np.arange(40) + 0.5) / 400
+    one, other = np.meshgrid(step, step)
+    facing = np.stack([one, other, 0 * one], axis=-1).reshape(-1, 3)
+    # Ten metres away and 1.5 m below the camera: seen at 8.5 degrees.
+    lying = np.stack([one, 0 * one, other], axis=-1).reshape(-1, 3)
+    noisy = facing + np.random.default_rng(0).normal(0, 0.02, (1600, 1)) * [0, 0, 1]
+    corners = np.array([[-0.05, -0.05, 10.0], [-0.05, 1.5, 9.95], [-0.05, -0.05, 10.0]])
+    found = covered(np.array([facing, lying, noisy]), corners, np.eye(3))
+    assert found[[0, 2]] == pytest.approx(16 * 15, rel=0.005)
+    assert found[1] == pytest.approx(16 * 15 * 0.15, rel=0.005)
+
+
+def test_pixels_covered_are_those_of_projected_points():
+    rng = np.random.default_rng(3)
+    clouds = rng.uniform(0, 0.1, (30, 50, 3)) * rng.choice([0.1, 1], (30, 1, 3))
+    rotation = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    corners = rng.uniform([-4, -2, 8], [4, 2, 40], (30, 3))
+    at = corners[:, None] + clouds @ rotation.T
+    image = at[..., :2] / at[..., 2:] * [1600, 1500]
+    area = [12 * np.sqrt(np.linalg.det(np.cov(own.T, bias=True))) for own in image]
+    assert covered(clouds, corners, rotation) == pytest.approx(area, rel=0.02)
+
+
+def test_one_point_and_none_cover_nothing():
+    single = pixels_covered(
+        np.array([1], np.int32), np.zeros((1, 3), np.float32), np.ones((3, 3)), np.eye(3), (9.0, 9.0), 0.5
+    )
+    assert single.tolist() == [0, 0, 0]

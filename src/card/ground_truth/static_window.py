@@ -9,13 +9,15 @@ import numpy as np
 import numpy.typing as npt
 
 from card.geometry import inverse
-from card.ground_truth import window_kernels as kernels
+from card.ground_truth import window_rows
 from card.ground_truth.hpr.workspace import Workspace
 from card.ground_truth.left_camera import LeftCamera
 from card.ground_truth.selection import Selection, diagonal
 from card.ground_truth.static_set import StaticSet
 from card.ground_truth.sweeps import Drive
 from card.ground_truth.voxels import find
+from card.ground_truth.window_cleaning import clean
+from card.ground_truth.window_view import View, emit, look
 
 Ordinals = npt.NDArray[np.int64]
 
@@ -58,7 +60,7 @@ class StaticWindow:
         )
         count = 0
         for burst in self._bursts.values():
-            count = kernels.number(burst.voxel, self._local, found, count)
+            count = window_rows.number(burst.voxel, self._local, found, count)
         self._found = found[:count].copy()
         self._rows = self._fill()
         self._queue = [
@@ -66,13 +68,13 @@ class StaticWindow:
         ]
         self._entered, self._left = [0, 0], [0, 0]
 
-    def _fill(self) -> kernels.Rows:
+    def _fill(self) -> window_rows.Rows:
         sizes = np.zeros(2 * len(self._found), dtype=np.int64)
         for i, burst in self._bursts.items():
-            kernels.measure(burst.voxel, self._local, self._sensor(i), sizes)
+            window_rows.measure(burst.voxel, self._local, self._sensor(i), sizes)
         start = np.concatenate([[0], np.cumsum(sizes)])
         take, points = self._workspace.take, int(start[-1])
-        rows = kernels.Rows(
+        rows = window_rows.Rows(
             start=start,
             head=start[:-1].copy(),
             tail=start[:-1].copy(),
@@ -83,10 +85,12 @@ class StaticWindow:
             clean=np.zeros(len(self._found), dtype=np.int64),
             left=np.zeros(len(self._found), dtype=np.int64),
             corner=self._static.grid.corners(self._static.keys[self._found]),
+            mean=np.zeros((len(self._found), 3)),
+            spread=np.zeros((len(self._found), 6)),
         )
         end = start[:-1].copy()
         for i, burst in self._bursts.items():
-            kernels.fill(burst.voxel, burst.offset, self._local, self._sensor(i), i, end, rows)
+            window_rows.fill(burst.voxel, burst.offset, self._local, self._sensor(i), i, end, rows)
         return rows
 
     def select(
@@ -103,12 +107,12 @@ class StaticWindow:
         view = self._view(world_from_rig)
         box = np.empty((2, 3))
         near = take("near voxels", len(self._found), np.int32)
-        listed, redundant, points_near = kernels.look(
+        listed, redundant, points_near = look(
             rows, view, self._static.grid.size, settings["min_lidars_per_voxel"], near, box
         )
         near = near[:listed]
         most = int((rows.start[2::2] - rows.start[:-2:2]).max(initial=0))
-        inliers, most_points = kernels.clean(
+        inliers, most_points = clean(
             rows,
             near,
             settings["mad_multiplier"],
@@ -122,9 +126,8 @@ class StaticWindow:
         )
         points = take("points", (most_points + 1, 3), np.float64)
         own = take("own", most_points + 1, np.bool_)
-        size, pixels_per_point = self._static.grid.size, float(settings["pixels_per_point"])
-        thinned, in_view, count = kernels.emit(
-            rows, near, view, size, pixels_per_point, keyframe_burst, points, own
+        thinned, in_view, count = emit(
+            rows, near, view, float(settings["pixels_per_point"]), keyframe_burst, points, own
         )
         counts = {
             "points_window": sum(self._bursts[int(i)].total for i in bursts),
@@ -145,20 +148,20 @@ class StaticWindow:
             len(wanted) and self._entered[sensor] < len(queue) and queue[self._entered[sensor]] <= wanted[-1]
         ):
             burst = self._bursts[queue[self._entered[sensor]]]
-            kernels.move(burst.voxel, self._local, sensor, rows.tail, rows.changed)
+            window_rows.move(burst.voxel, self._local, sensor, rows.tail, rows.changed)
             self._entered[sensor] += 1
         first = wanted[0] if len(wanted) else np.inf
         while self._left[sensor] < self._entered[sensor] and queue[self._left[sensor]] < first:
             burst = self._bursts[queue[self._left[sensor]]]
-            kernels.move(burst.voxel, self._local, sensor, rows.head, rows.changed)
+            window_rows.move(burst.voxel, self._local, sensor, rows.head, rows.changed)
             self._left[sensor] += 1
         assert self._entered[sensor] - self._left[sensor] == len(wanted), "frames must come in order of time"
 
-    def _view(self, world_from_rig: npt.NDArray[np.float64]) -> kernels.View:
+    def _view(self, world_from_rig: npt.NDArray[np.float64]) -> View:
         camera_from_world = inverse(world_from_rig @ self._camera.rig_from_camera)
         low, high = self._camera.bounds(self._settings["view_margin_rad"])
         image = self._camera.undistorted
-        return kernels.View(
+        return View(
             rotation=np.ascontiguousarray(camera_from_world[:3, :3]),
             translation=np.ascontiguousarray(camera_from_world[:3, 3]),
             low=low,

@@ -12,7 +12,7 @@ from card.geometry import inverse
 from card.ground_truth.left_camera import LeftCamera
 from card.ground_truth.reference.mad import mad_inliers
 from card.ground_truth.reference.static_cloud import StaticCloud, seen_by
-from card.ground_truth.reference.thinning import pixel_limit, thin
+from card.ground_truth.reference.thinning import pixels_covered, thin
 from card.ground_truth.selection import Selection, diagonal
 from card.ground_truth.static_set import StaticSet
 
@@ -55,11 +55,14 @@ def select(
     )
     kept = kept[clean]
     counts["points_clean"] = len(kept)
+    image = camera.undistorted
+    covered = pixels_covered(
+        cloud.voxel[kept], cloud.offset[kept], corners, matrix[:3, :3], (image.fx, image.fy), nearest
+    )
     if settings["points_per_voxel"]:
         kept = kept[thin(cloud.voxel[kept], np.full(len(corners), settings["points_per_voxel"]))]
     if settings["pixels_per_point"]:
-        depth, image = np.maximum(centres[:, 2], nearest), camera.undistorted
-        limit = pixel_limit(depth, static.grid.size, image.fx, settings["pixels_per_point"])
+        limit = np.maximum((covered / settings["pixels_per_point"]).astype(np.int64), 1)
         # Front LiDAR first, each in order of time.
         kept = kept[np.argsort(~cloud.front[kept], kind="stable")]
         kept = kept[thin(cloud.voxel[kept], limit)]

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
@@ -27,13 +30,55 @@ def thin(voxel: npt.NDArray[np.int32], limit: npt.NDArray[np.int64]) -> npt.NDAr
     return keep
 
 
-def pixel_limit(
-    depth: npt.NDArray[np.float64], size: float, focal_px: float, pixels_per_point: float
-) -> npt.NDArray[np.int64]:
-    """Most points (V,) of voxels of edge `size` at `depth` (V,), metres: one for so many pixels, or one.
+def pixels_covered(
+    voxel: npt.NDArray[np.int32],
+    offset: npt.NDArray[np.float32],
+    corner: npt.NDArray[np.float64],
+    rotation: npt.NDArray[np.float64],
+    focal_px: tuple[float, float],
+    nearest: float,
+) -> npt.NDArray[np.float64]:
+    """How many pixels (V,) the points of each voxel cover: the area of the patch that spreads as they do.
 
-    A voxel covers some (f s / z)^2 pixels. Of more points than can be told apart in the image, hidden-point
-    removal keeps the nearest, which noise alone decides.
+    With C the covariance of the points of a voxel on the image, to first order, that is 12 sqrt(det C): an
+    evenly filled parallelogram of area A has det C = (A / 12)^2. A surface seen at a grazing angle covers
+    little, and noise along the camera's rays nothing.
+
+    Parameters
+    ----------
+    voxel : (N,) the voxel of each point. offset : (N, 3) metres from its corner.
+    corner : (V, 3) camera_left, metres. rotation : (3, 3) camera_from_world. focal_px : of x and y.
+    nearest : smallest depth, metres.
     """
-    edge = focal_px * size / depth
-    return np.maximum((edge * edge / pixels_per_point).astype(np.int64), 1)
+    points = offset.astype(np.float64).T
+    counts = np.maximum(np.bincount(voxel, minlength=len(corner)), 1)
+
+    def mean(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        # Added up one after the other, in the order given: other sums round differently.
+        return np.bincount(voxel, values, len(corner)) / counts
+
+    centre = [mean(axis) for axis in points]
+    spread = [[mean(points[i] * points[j]) - centre[i] * centre[j] for j in range(3)] for i in range(3)]
+    place = [
+        corner[:, i] + (row[0] * centre[0] + row[1] * centre[1] + row[2] * centre[2])
+        for i, row in enumerate(rotation)
+    ]
+    z = np.maximum(place[2], nearest)
+    u, w = (
+        [(rotation[i, k] - place[i] / z * rotation[2, k]) * (focal_px[i] / z) for k in range(3)]
+        for i in range(2)
+    )
+
+    def form(a: Sequence[npt.NDArray[np.float64]], b: Sequence[npt.NDArray[np.float64]]) -> Any:
+        return (
+            a[0] * b[0] * spread[0][0]
+            + a[1] * b[1] * spread[1][1]
+            + a[2] * b[2] * spread[2][2]
+            + (a[0] * b[1] + a[1] * b[0]) * spread[0][1]
+            + (a[0] * b[2] + a[2] * b[0]) * spread[0][2]
+            + (a[1] * b[2] + a[2] * b[1]) * spread[1][2]
+        )
+
+    across = form(u, w)
+    area: npt.NDArray[np.float64] = 12 * np.sqrt(np.maximum(form(u, u) * form(w, w) - across * across, 0))
+    return area
