@@ -113,14 +113,17 @@ def clean(
             if total < min_inliers and not off:
                 total = 0
             share = min(limit, total) if limit > 0 else total
-            rank = 0
+            # Point k of n inliers stays where floor(k share / n) steps up: k share mod n < share.
+            rest = 0
             sums[:] = 0.0
             for k in range(count):
                 at = place[k]
                 inlier = total > 0 and radius[k] <= largest
-                rows.kept[at] = inlier and rank * share // total != (rank - 1) * share // total
-                rank += inlier
+                rows.kept[at] = inlier and rest < share
                 if inlier:
+                    rest += share
+                    if rest >= total:
+                        rest -= total
                     _add(rows.offset[at], sums)
             _spread(sums, max(total, 1), rows.mean[v], rows.spread[v])
             rows.clean[v], rows.left[v] = total, share

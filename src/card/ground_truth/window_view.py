@@ -130,6 +130,7 @@ def emit(
     rotation, translation = view.rotation, view.translation
     rows_ego, columns_ego = view.ego.shape
     corner, u, w = np.empty(3), np.empty(3), np.empty(3)
+    above = view.ego_top - 1 - view.cy
     thinned = in_view = count = 0
     for v in near:
         for k in range(3):
@@ -142,13 +143,17 @@ def emit(
         share = total
         if pixels_per_point > 0:
             share = min(total, max(1, int(_pixels(rows, v, view, corner, u, w) / pixels_per_point)))
-        rank = 0
+        # Point k of the n that cleaning kept stays where floor(k share / n) steps up: k share mod n < share.
+        rest = 0
         for row in range(2 * v, 2 * v + 2):
             for at in range(rows.head[row], rows.tail[row]):
                 if not rows.kept[at]:
                     continue
-                rank += 1
-                if (rank - 1) * share // total == (rank - 2) * share // total:
+                stays = rest < share
+                rest += share
+                if rest >= total:
+                    rest -= total
+                if not stays:
                     continue
                 thinned += 1
                 a, b, c = (
@@ -166,9 +171,11 @@ def emit(
                 in_view += 1
                 points[count, 0], points[count, 1], points[count, 2] = x, y, z
                 own[count] = rows.burst[at] == keyframe
-                line = int(min(max(np.rint(y / z * view.fy + view.cy), 0), rows_ego - 1))
-                if line >= view.ego_top:
-                    column = int(min(max(np.rint(x / z * view.fx + view.cx), 0), columns_ego - 1))
-                    count -= view.ego[line, column]
+                # Well above the body nothing is divided.
+                if y * view.fy >= above * z:
+                    line = int(min(max(np.rint(y / z * view.fy + view.cy), 0), rows_ego - 1))
+                    if line >= view.ego_top:
+                        column = int(min(max(np.rint(x / z * view.fx + view.cx), 0), columns_ego - 1))
+                        count -= view.ego[line, column]
                 count += 1
     return thinned, in_view, count
