@@ -136,7 +136,8 @@ class Drive:
 
     def _takes_part(self, i: int, burst: Burst) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
         """Points (N,) of burst `i` that are not at the sensor's origin, and those that the crop keeps."""
-        real = np.linalg.norm(burst.points, axis=1) >= self._settings["min_range_m"]
+        x, y, z = burst.points.T
+        real = np.sqrt(x * x + y * y + z * z) >= self._settings["min_range_m"]
         mode = self._settings["front_crop" if self.front[i] else "rear_crop"]
         return real, _crop(burst.points, mode, self._rig_from[self.sensor(i)])
 

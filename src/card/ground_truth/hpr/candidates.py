@@ -55,10 +55,10 @@ def near_enough(cell: Any, range2: Any, limit: Any, kept: Any) -> int:
 
 
 @compiled
-def low_enough(lifted: Any, index: Any, bound: Any, cells: Cells, kept: Any, place: Any) -> int:
-    """Keep the lifted points (M, 4) that are not above the bilinear bound; return how many.
+def low_enough(lifted: Any, index: Any, bound: Any, cells: Cells, place: Any) -> int:
+    """Move the lifted points (M, 4) that are not above the bilinear bound to the front; return how many.
 
-    kept, place : (M,), (M, 2) output: their indices, and places as `cells.place_all` writes them.
+    index : (M,) of the points, moved with them. place : (M, 2) output, as `cells.place_all` writes it.
     """
     per_cell = 1.0 / cells.size
     count = 0
@@ -70,7 +70,10 @@ def low_enough(lifted: Any, index: Any, bound: Any, cells: Cells, kept: Any, pla
         fine_x, fine_y = int(x * PARTS), int(y * PARTS)
         low = bound[row, column] + x * (bound[row, column + 1] - bound[row, column])
         high = bound[row + 1, column] + x * (bound[row + 1, column + 1] - bound[row + 1, column])
-        kept[count] = index[i]
+        height = lifted[i, 2]
+        index[count] = index[i]
+        for k in range(4):
+            lifted[count, k] = lifted[i, k]
         place[count, 0], place[count, 1] = column * PARTS + fine_x, row * PARTS + fine_y
-        count += lifted[i, 2] <= (low + y * (high - low)) * (1 + _HEIGHT_ROOM)
+        count += height <= (low + y * (high - low)) * (1 + _HEIGHT_ROOM)
     return count

@@ -29,47 +29,50 @@ def _spread(bits: int) -> int:
 
 
 @compiled
-def morton_order(place: Any, morton: Any, order: Any, spare: Any) -> None:
+def morton_order(place: Any, unsorted: Any, order: Any, morton: Any) -> None:
     """Sort points by the Morton number of their places; the order given holds within a place.
 
-    place : (M, 2) along u and v. morton, order, spare : (M,) uint32; the numbers and the permutation.
+    place : (M, 2) along u and v. unsorted, order, morton : (M,) uint32; the numbers as they come, the
+    permutation, and the numbers in order.
     """
     mask = (1 << _DIGIT) - 1
     starts = np.zeros((2, (1 << _DIGIT) + 1), np.int64)
     for i in range(order.size):
         number = _spread(np.int64(place[i, 0])) | (_spread(np.int64(place[i, 1])) << 1)
-        morton[i] = number
+        unsorted[i] = number
         starts[0, (number & mask) + 1] += 1
         starts[1, (number >> _DIGIT) + 1] += 1
     for digit in range(1 << _DIGIT):
         starts[0, digit + 1] += starts[0, digit]
         starts[1, digit + 1] += starts[1, digit]
     for i in range(order.size):
-        digit = morton[i] & mask
-        spare[starts[0, digit]] = i
+        digit = unsorted[i] & mask
+        morton[starts[0, digit]] = i
         starts[0, digit] += 1
     for k in range(order.size):
-        i = spare[k]
-        digit = morton[i] >> _DIGIT
+        i = morton[k]
+        digit = unsorted[i] >> _DIGIT
         order[starts[1, digit]] = i
         starts[1, digit] += 1
+    for k in range(order.size):
+        morton[k] = unsorted[order[k]]
 
 
 @compiled
-def by_rounds(lifted: Any, morton: Any, order: Any, sequence: Any, used: Any) -> None:
+def by_rounds(lifted: Any, morton: Any, sequence: Any, used: Any) -> None:
     """Write the order of insertion to `sequence` (M,): positions in the Morton order.
 
-    lifted : (M, 4) in Morton order. morton : (M,) of the points as given. used : (M,) bool.
+    lifted, morton : (M, 4), (M,) in Morton order. used : (M,) bool.
     """
     used[:] = False
     count = 0
-    size = order.size
+    size = sequence.size
     for shift in _BLOCKS:
         i = 0
         while i < size:
-            block = morton[order[i]] >> shift
+            block = morton[i] >> shift
             best, nearest, j = -1, np.inf, i
-            while j < size and morton[order[j]] >> shift == block:
+            while j < size and morton[j] >> shift == block:
                 if lifted[j, 3] < nearest and not used[j]:
                     best, nearest = j, lifted[j, 3]
                 j += 1

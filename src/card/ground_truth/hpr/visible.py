@@ -47,36 +47,38 @@ def visible_points(
     memory = workspace or Workspace()
     cells = lay_out(u_low, u_high, v_low, v_high, len(points))
     candidates = _all if mostly_visible else _candidates
-    index, place = candidates(points, 2 * radius, cells, memory)
-    morton, order, spare, sequence = memory.take("order", (4, len(index)), np.uint32)
-    morton_order(place, morton, order, spare)
-    in_order = memory.take("in order", len(index), np.uint32)
-    np.take(index, order, out=in_order)
+    index, lifted, place = candidates(points, 2 * radius, cells, memory)
+    unsorted, order, morton, sequence = memory.take("order", (4, len(index)), np.uint32)
+    morton_order(place, unsorted, order, morton)
     ordered = memory.take("ordered", (len(index) + CORNERS, COLUMNS), np.float64)
-    lift(points, in_order, 2 * radius, ordered)
+    # Clipped, as numpy copies what it may have to refuse.
+    np.take(lifted, order, axis=0, out=ordered[:-CORNERS], mode="clip")
     add_corners(ordered, cells)
-    by_rounds(ordered, morton, order, sequence, memory.take("used", len(index), np.bool_))
+    by_rounds(ordered, morton, sequence, memory.take("used", len(index), np.bool_))
     vertex = np.zeros(len(ordered), np.bool_)
     if not lower_hull(ordered, sequence, Mesh.of(len(index), memory), vertex, MAX_STEPS):
         return visible_by_hull(points, radius)
     seen = np.zeros(len(points), np.bool_)
-    seen[in_order[vertex[:-CORNERS]]] = True
+    seen[index[order[vertex[:-CORNERS]]]] = True
     return np.flatnonzero(seen)
 
 
 def _all(
     points: Points, diameter: float, cells: Cells, memory: Workspace
-) -> tuple[npt.NDArray[np.uint32], npt.NDArray[np.uint16]]:
+) -> tuple[npt.NDArray[np.uint32], Points, npt.NDArray[np.uint16]]:
     """Every point as `_candidates` gives them."""
+    index = np.arange(len(points), dtype=np.uint32)
+    lifted = memory.take("lifted", (len(points), COLUMNS), np.float64)
+    lift(points, index, diameter, lifted)
     place = memory.take("place", (len(points), 2), np.uint16)
     place_all(points, cells, place)
-    return np.arange(len(points), dtype=np.uint32), place
+    return index, lifted, place
 
 
 def _candidates(
     points: Points, diameter: float, cells: Cells, memory: Workspace
-) -> tuple[npt.NDArray[np.uint32], npt.NDArray[np.uint16]]:
-    """What may be visible: indices (M,), and places (M, 2) as `place_all` writes them."""
+) -> tuple[npt.NDArray[np.uint32], Points, npt.NDArray[np.uint16]]:
+    """What may be visible: indices (M,), lifted (M, 4), and places (M, 2) as `place_all` writes them."""
     nearest = memory.take("nearest", cells.rows * cells.columns, np.uint64)
     nearest[:] = EMPTY
     cell = memory.take("cell", len(points), np.uint32)
@@ -92,10 +94,9 @@ def _candidates(
     index = index[: near_enough(cell, range2, limit, index)]
     lifted = memory.take("lifted", (len(index), COLUMNS), np.float64)
     lift(points, index, diameter, lifted)
-    kept_index = memory.take("kept index", len(index), np.uint32)
     place = memory.take("place", (len(index), 2), np.uint16)
-    count = low_enough(lifted, index, bound, cells, kept_index, place)
-    return kept_index[:count], place[:count]
+    count = low_enough(lifted, index, bound, cells, place)
+    return index[:count], lifted[:count], place[:count]
 
 
 def _refuse(point: Points, radius: float) -> NoReturn:
