@@ -1,9 +1,9 @@
 """A frame's ground truth at full scale, from bursts on disk to the saved cloud, against two naive ways.
 
 The static set is every voxel that both LiDARs hit; votes would take away a hundredth of it. The naive way
-reads the bursts of each frame's windows anew, with laspy and a pose a point in numpy; the tuned one keeps world
-points in memory, and so reads a burst once. Neither writes. They keep all points that cleaning leaves, as the
-paper does, and so does ours where it is compared with them.
+reads the bursts of each frame's windows anew, with laspy and a pose a point in numpy; the tuned one keeps
+world points in memory, and so reads a burst once. Neither writes. They keep all points that cleaning leaves,
+as the paper does, and so does ours where it is compared with them.
 """
 
 import resource
