@@ -124,7 +124,7 @@ def write_frames(folder: Path, t_ns: NDArray[np.int64]) -> None:
 
 
 def run(
-    folder: Path, out: Path, threads: int = 1, **changes: Any
+    folder: Path, out: Path, threads: int = 1, settings: dict[str, float] | None = None, **changes: Any
 ) -> tuple[dict[str, Any], Any, dict[str, Any]]:
     inputs = {n: folder / f"{n}.parquet" for n in ("bursts", "frames", "trajectory")}
     inputs |= {"calibration": folder / "calibration.json", "static_voxels": folder / "static_voxels.npz"}
@@ -134,7 +134,7 @@ def run(
         wheel_excitation=out / "wheel_excitation.json",
         road_planes=out / "road_planes.parquet",
         report=out / "wheels.report.json",
-        settings=default_settings("wheels"),
+        settings=default_settings("wheels") | (settings or {}),
         gates=[],
         threads=threads,
     )
@@ -197,6 +197,20 @@ def test_road_planes_pass_under_the_wheels(drive: Path, result: Any) -> None:
         assert abs(heights.mean()) < 1e-4
         assert np.sqrt(np.mean(heights**2)) == pytest.approx(columns["residual_m"][i], abs=1e-4)
     assert (columns["residual_m"][rows] > 0.01).any()  # one side on the bump
+
+
+@pytest.mark.parametrize(("setting", "limit"), [("max_plane_residual_m", 0.004), ("max_plane_std_m", 0.0)])
+def test_planes_beyond_a_limit_are_not_valid(
+    drive: Path, result: Any, tmp_path: Path, setting: str, limit: float
+) -> None:
+    """One side on the bump leaves a residual; no plane is known exactly."""
+    _, table, report = run(drive, tmp_path, settings={setting: limit})
+    before, residual = np.asarray(result[1]["valid"]), np.asarray(table["residual_m"])
+    within = residual <= limit if setting == "max_plane_residual_m" else np.zeros(len(residual), dtype=bool)
+    np.testing.assert_array_equal(np.asarray(table["valid"]), before & within)
+    assert 5 < np.count_nonzero(before & ~within)
+    (share,) = (figure["value"] for figure in report["figures"] if figure["name"] == "plane_valid_pct")
+    assert share == pytest.approx(100 * (before & within).mean())
 
 
 def test_points_outside_the_static_voxels_do_not_count(drive: Path, tmp_path: Path) -> None:

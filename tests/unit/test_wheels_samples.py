@@ -1,5 +1,6 @@
 """Corridor points of one burst: what cropping must not change."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -73,16 +74,36 @@ def test_a_burst_that_is_cropped_keeps_its_own_end(tmp_path: Path, deskewed: boo
     np.testing.assert_allclose(found.height, wanted.height, atol=2e-4)
 
 
-def test_cut_points_are_those_of_the_plain_way(tmp_path: Path) -> None:
+def turning() -> Trajectory:
+    """Four seconds at 5 m/s round a circle of 4 m."""
+    t = np.arange(0, 4, 0.01)
+    yaw = 5 * t / 4
+    quaternion = Rotation.from_euler("Z", yaw[:, None]).as_quat()[:, [3, 0, 1, 2]]
+    position = np.stack([4 * np.cos(yaw) - 4, 4 * np.sin(yaw), np.full_like(t, 1.7)], axis=1)
+    return Trajectory(START_NS + np.round(t * 1e9).astype(np.int64), position, quaternion)
+
+
+def shunting() -> Trajectory:
+    """Forward at 5 m/s, standing while the burst is taken, and back."""
+    t = np.arange(0, 4, 0.01)
+    y = np.interp(t, [0, 1.4, 1.7, 4], [0, 7, 7, 1])
+    still = np.tile([1.0, 0, 0, 0], (len(t), 1))
+    position = np.stack([0 * t, y, np.full_like(t, 1.7)], axis=1)
+    return Trajectory(START_NS + np.round(t * 1e9).astype(np.int64), position, still)
+
+
+@pytest.mark.parametrize("drive", [trajectory, turning, shunting])
+def test_cut_points_are_those_of_the_plain_way(tmp_path: Path, drive: Callable[[], Trajectory]) -> None:
     """Reference: nothing cropped, every point deskewed, static ones first, nearest poses by a tree."""
     rng = np.random.default_rng(4)
-    path = trajectory()
+    path = drive()
     rig_from_lidar = transform(
         [0.1, 0.5, 0.2], Rotation.from_euler("ZX", [0.3, -0.02]).as_quat()[[3, 0, 1, 2]]
     )
     offset = np.sort(rng.integers(0, 100_000_000, 20_000)).astype(np.uint32)
     t_ns = START_NS + 1_500_000_000
-    world = rng.uniform([-1.5, 0, -0.5], [1.5, 16, 0.5], (20_000, 3))
+    place = path.translation_m[rng.integers(0, len(path.t_ns), 20_000)] - [0, 0, 1.7]
+    world = place + rng.uniform([-1.5, -1.5, -0.5], [1.5, 1.5, 0.5], (20_000, 3))
     sensor = apply(inverse(path.at(t_ns + offset.astype(np.int64)) @ rig_from_lidar), world)
     ring = rng.integers(0, 32, 20_000).astype(np.uint8)
     write_burst(tmp_path / f"{t_ns}.laz", Burst(t_ns, sensor, ring, ring, offset))
@@ -103,7 +124,8 @@ def test_cut_points_are_those_of_the_plain_way(tmp_path: Path) -> None:
         arc = float(wheel.arc_at(t_ns))
         plain, _ = corridor_points(points, wheel, (arc - reach_m, arc + reach_m), corridor, compiled=False)
         assert 100 < len(plain) == len(road)
-        for name in ("arc", "sideways", "height"):
+        assert len(set(road.run)) == (2 if drive is shunting else 1)
+        for name in ("arc", "sideways", "height", "run"):
             np.testing.assert_allclose(getattr(road, name), getattr(plain, name), rtol=0, atol=1e-10)
 
 

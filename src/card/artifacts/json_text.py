@@ -29,7 +29,7 @@ def _pieces(value: Any, line: str) -> Iterator[str]:
             lead = ","
         yield line + "}"
     elif isinstance(value, list) and not {dict, list}.isdisjoint(map(type, value)):
-        lists = all(type(item) is list for item in value)
+        lists = set(map(type, value)) == {list}
         if lists and _NUMBERS.issuperset(map(type, chain.from_iterable(value))):
             # Numbers have no brackets: each pair of them is between two rows.
             rows = _encode(value)[1:-1].replace("], [", f"],{inner}[")
