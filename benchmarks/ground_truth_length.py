@@ -6,9 +6,6 @@ A simulated minute at full scale is driven again and again, each lap further on,
 voxels. What grows with the drive is the state of its voxels; a frame must not.
 """
 
-import json
-import resource
-import subprocess
 import sys
 import tempfile
 import time
@@ -20,6 +17,7 @@ import numpy as np
 from field import OUT
 from full_scale import FullScale, open_drive
 from numpy.typing import NDArray
+from own_process import alone, peak_gb
 
 from card.artifacts import atomic_folder, progress
 from card.ground_truth.aggregate import BLOCK_FRAMES
@@ -86,17 +84,16 @@ def measure(minutes: int) -> dict[str, Any]:
         static = StaticSet(grid, voxels.keys[both], voxels.counts[both], {})
         found = {"minutes": minutes, "bursts": len(drive), "voxels": len(voxels.keys), "map_cpu_s": mapped}
         del voxels, both
-        map_gb = _peak_gb()
+        map_gb = peak_gb()
         before = time.process_time()
         _make_frames(scene, drive, static)
         frame = (time.process_time() - before) / FRAMES
-        return found | {"frame_cpu_s": frame, "map_peak_gb": map_gb, "peak_gb": _peak_gb()}
+        return found | {"frame_cpu_s": frame, "map_peak_gb": map_gb, "peak_gb": peak_gb()}
 
 
 def in_a_process(minutes: int) -> dict[str, Any]:
     """`measure` in a process of its own, so that its peak is its own."""
-    command = [sys.executable, __file__, "--json", str(minutes)]
-    return json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout)
+    return alone(measure, minutes)[0]
 
 
 def _make_frames(scene: FullScale, drive: Laps, static: StaticSet) -> None:
@@ -124,14 +121,7 @@ def _points_on_disk(drive: Any, bursts: NDArray[np.int64]) -> Path:
     return folder
 
 
-def _peak_gb() -> float:
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
-
-
 if __name__ == "__main__":
-    if sys.argv[1] == "--json":
-        print(json.dumps(measure(int(sys.argv[2]))))
-    else:
-        for argument in sys.argv[1:]:
-            found = in_a_process(int(argument))
-            print("  ".join(f"{k} {v:.4g}" for k, v in found.items()), flush=True)
+    for argument in sys.argv[1:]:
+        found = in_a_process(int(argument))
+        print("  ".join(f"{k} {v:.4g}" for k, v in found.items()), flush=True)

@@ -1,15 +1,12 @@
 """Both stages of the poses at the size of a real drive, and their memory over ten minutes."""
 
-import json
-import resource
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from cost import cpu_s
 from field import field_drive
+from own_process import alone
 
 from card.artifacts import default_settings, read_table
 from card.poses.estimate_odometry import estimate_odometry
@@ -19,7 +16,6 @@ from card.recording.paths import list_bursts
 
 DRIVE, SEED, SECONDS = "it_town_revisit", 1, 60.0  # two rounds of 220 m
 LIDAR = "lidar_front"
-ROOT = Path(__file__).resolve().parents[1]
 #: The drive of ten minutes has a tenth of the columns: what grows with it are the nodes and the map.
 LONG_S, LONG_COLUMNS = 600.0, 200
 
@@ -92,25 +88,15 @@ def _shared(folder: Path, scratch: Path, bursts: Path | None, calibration: Path 
 
 def peak_gb(scratch: Path, seconds: float = LONG_S) -> float:
     """Greatest memory of a process that takes a drive of many rounds through both stages, GB."""
-    result = subprocess.run(
-        _command(scratch / "long", seconds), cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True
-    )
-    return float(json.loads(result.stdout.splitlines()[-1]))
+    alone(simulate, scratch / "long", seconds)
+    return alone(_both_stages, scratch / "long", seconds)[1].peak_gb
 
 
-def _command(folder: Path, seconds: float, *action: str) -> list[str]:
-    """This module in a process of its own; as a script it would hide other packages behind its neighbours."""
-    return [sys.executable, "-m", "speed.poses", str(folder), str(seconds), *action]
-
-
-def long_drive(folder: Path, seconds: float) -> None:
-    """Simulate a long drive in a process of its own, and take it through both stages."""
-    subprocess.run(_command(folder, seconds, "simulate"), cwd=ROOT, check=True)
+def _both_stages(folder: Path, seconds: float) -> None:
     write_bursts_table(folder, folder)
     odometry(folder, folder)
     batch(folder, folder)
     assert read_table(folder / "nodes.parquet", "pose_graph_nodes").num_rows > 9 * seconds
-    print(json.dumps(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e9))
 
 
 def simulate(folder: Path, seconds: float) -> None:
@@ -136,7 +122,3 @@ def simulate(folder: Path, seconds: float) -> None:
 
 def _row(figure: str, value: float, unit: str, aim: float) -> dict[str, Any]:
     return {"stage": "poses", "figure": figure, "value": value, "unit": unit, "aim": aim, "better": "lower"}
-
-
-if __name__ == "__main__":
-    (simulate if sys.argv[3:] == ["simulate"] else long_drive)(Path(sys.argv[1]), float(sys.argv[2]))

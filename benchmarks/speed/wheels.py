@@ -1,12 +1,5 @@
 """Wheel excitation at the size of a real drive, and its spline beside scipy's optimizer."""
 
-import json
-import os
-import resource
-import subprocess
-import sys
-import time
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +8,7 @@ from ceres_reference import corridor, wheel_settings
 from cost import cpu_s
 from field import field_drive
 from field_ground_truth import inputs_of
+from own_process import Spent, alone
 from scipy.interpolate import BSpline
 from scipy.optimize import least_squares
 from scipy.sparse import csr_array, diags_array, eye_array, hstack, vstack
@@ -43,44 +37,23 @@ def rows(scratch: Path, repeats: int) -> list[dict[str, Any]]:
     fast = cpu_s(lambda: fit_profile(*short, wheel_settings()), repeats)
     slow = cpu_s(lambda: _least_squares(*short), repeats)
     return [
-        _row("cpu_s_10min", stage.own_s + stage.workers_s, "CPU-s", 120.0, "lower"),
+        _row("cpu_s_10min", stage.own_s + stage.children_s, "CPU-s", 120.0, "lower"),
         _row("alone_s_10min", stage.own_s, "CPU-s", None, "lower"),
         _row("wall_s_10min", stage.wall_s, "s", 60.0, "lower"),
-        _row("peak_gb_10min", stage.peak_gb, "GB", None, "lower"),
+        _row("peak_gb_10min", stage.peak_gb + THREADS * stage.child_peak_gb, "GB", None, "lower"),
         _row("spline_s_10min", spline, "CPU-s", None, "lower"),
         _row("spline_ratio", slow / fast, "1", None, "higher"),
     ]
 
 
-@dataclass(frozen=True)
-class StageCost:
-    """CPU-seconds of a stage's process and of its workers, seconds on the clock and peak memory of all."""
-
-    own_s: float
-    workers_s: float
-    wall_s: float
-    peak_gb: float
-
-
-def stage_cost(folder: Path, calibration: Path) -> StageCost:
+def stage_cost(folder: Path, calibration: Path) -> Spent:
     """The cost of the stage on the drive in `folder`."""
-    command = [sys.executable, __file__, str(folder), str(calibration)]
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
-    start = time.perf_counter()
-    result = subprocess.run(command, check=True, capture_output=True, text=True, env=environment)
-    wall = time.perf_counter() - start
-    own, workers, peak = json.loads(result.stdout.splitlines()[-1])
-    return StageCost(own, workers, wall, peak)
+    return alone(_excite, folder, calibration)[1]
 
 
-def _measure(folder: Path, calibration: Path) -> None:
+def _excite(folder: Path, calibration: Path) -> None:
     long = Long(folder)
     excite_only(folder, folder, long.bursts, long.frames, calibration, long.trajectory, long.static_voxels)
-    usages = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
-    own, workers = (usage.ru_utime + usage.ru_stime for usage in usages)
-    # What a worker shares with its parent counts in both.
-    peak = (usages[0].ru_maxrss + THREADS * usages[1].ru_maxrss) * 1024 / 1e9
-    print(json.dumps([own, workers, peak]))
 
 
 def _least_squares(arc: Any, sideways: Any, height: Any) -> Any:
@@ -117,7 +90,3 @@ def _least_squares(arc: Any, sideways: Any, height: Any) -> Any:
 
 def _row(figure: str, value: float, unit: str, aim: float | None, better: str) -> dict[str, Any]:
     return {"stage": "wheels", "figure": figure, "value": value, "unit": unit, "aim": aim, "better": better}
-
-
-if __name__ == "__main__":
-    _measure(Path(sys.argv[1]), Path(sys.argv[2]))
