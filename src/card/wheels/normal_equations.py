@@ -92,8 +92,12 @@ class NormalEquations:
         LinAlgError
             If the weights are no weights, so that the equations are not positive definite.
         """
-        if not self._compiled or (penalty, tilt_penalty) != self._penalties:
+        if (penalty, tilt_penalty) != self._penalties:
             self._weighed[:] = True
+        if not self._compiled:  # from scratch
+            self._weighed[:] = True
+            for array in (self._factor, self._forward, self._solution):
+                array[:] = np.nan
         sums = self._products, self._sums
         written = banded_kernels.assemble(
             *sums, penalty, tilt_penalty, RIDGE, self._weighed, self._band, self._right

@@ -97,7 +97,8 @@ def fit_profile(
 
     arc : (N,) in increasing order. sideways : (N,) offset to the right of the path. height : (N,). `guess`
     (N,) is about how high the road is at each point, 0 if not given. All in metres. compiled : whether the
-    sums over the points are taken in machine code; the plain form gives the same bits.
+    sums over the points are taken in machine code and the equations solved anew only where they changed; the
+    plain form gives the same bits.
 
     Minimises the sum of Tukey's loss over the heights plus the penalty times the squared second differences
     of the coefficients, by reweighted least squares (supplement, "Wheel Excitation"). The loss is annealed
