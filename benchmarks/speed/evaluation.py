@@ -1,12 +1,7 @@
 """Evaluation of full-size frames: against its plain form in numpy, and against merely reading the files."""
 
 import io
-import json
-import os
-import resource
 import statistics
-import subprocess
-import sys
 import time
 import zipfile
 from pathlib import Path
@@ -14,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from cost import cpu_s
+from own_process import alone
 
 from card.artifacts import default_settings, load_schema, write_json, write_table
 from card.benchmark.evaluate import evaluate
@@ -166,11 +162,24 @@ def _reading(release: Release, method: Method) -> float:
 
 def _whole(tree: Path, predictions: Path, out: Path) -> dict[str, float]:
     """Seconds and peak of memory of a whole evaluation, in a process of its own."""
-    command = [sys.executable, "-m", __name__, str(tree), str(predictions), str(out)]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    done = subprocess.run(command, check=True, stdout=subprocess.PIPE, env=environment)
-    measured: dict[str, float] = json.loads(done.stdout)
-    return measured
+    seconds, spent = alone(_evaluate, tree, predictions, out)
+    return {"seconds": seconds, "peak_gb": spent.peak_gb}
+
+
+def _evaluate(tree: Path, predictions: Path, out: Path) -> float:
+    for _ in range(2):  # the first one loads compiled code
+        start = time.perf_counter()
+        evaluate(
+            release=tree,
+            split="test",
+            method=Method("method", predictions),
+            task="depth",
+            out=out,
+            report=out.with_suffix(".report.json"),
+            settings=SETTINGS,
+        )
+        seconds = time.perf_counter() - start
+    return seconds
 
 
 def _table(path: Path, schema: str, listed: list[dict[str, Any]]) -> None:
@@ -190,21 +199,3 @@ def _npz(points: Any) -> bytes:
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
         archive.writestr("points.npy", array.getvalue())
     return buffer.getvalue()
-
-
-if __name__ == "__main__":
-    tree, predictions, out = map(Path, sys.argv[1:])
-    for _ in range(2):  # the first one loads compiled code
-        start = time.perf_counter()
-        evaluate(
-            release=tree,
-            split="test",
-            method=Method("method", predictions),
-            task="depth",
-            out=out,
-            report=out.with_suffix(".report.json"),
-            settings=SETTINGS,
-        )
-        seconds = time.perf_counter() - start
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e9
-    print(json.dumps({"seconds": seconds, "peak_gb": peak}))

@@ -1,9 +1,6 @@
 """The static grid and the moved votes at the size of a real drive, and how both grow with its length."""
 
-import resource
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +9,7 @@ from cost import cpu_s
 from field import field_drive
 from field_ground_truth import inputs_of
 from numpy.typing import NDArray
+from own_process import alone
 
 from card.artifacts import default_settings
 from card.geometry import Trajectory
@@ -49,17 +47,16 @@ def rows(scratch: Path, repeats: int) -> list[dict[str, Any]]:
     ]
     for minutes, copies in MINUTES.items():
         # A process of its own: its peak memory is that of this grid.
-        with ProcessPoolExecutor(1, mp_context=get_context("fork")) as pool:
-            seconds, gigabytes = pool.submit(_long, bursts, drive.origins, drive.trajectory, copies).result()
+        seconds, spent = alone(_long, bursts, drive.origins, drive.trajectory, copies)
         per_burst = 1e3 * seconds / (len(bursts) * copies)
         found.append(_row(f"grid_ms_per_burst_{minutes}min", per_burst, "ms", 10))
-    return [*found, _row("grid_peak_gb_10min", gigabytes, "GB", 4)]
+    return [*found, _row("grid_peak_gb_10min", spent.peak_gb, "GB", 4)]
 
 
 def _long(
     bursts: Sequence[Burst], origins: NDArray[np.float64], trajectory: Trajectory, copies: int
-) -> tuple[float, float]:
-    """CPU-seconds of the grid over copies of a drive, and the peak memory of this process, GB."""
+) -> float:
+    """CPU-seconds of the grid over copies of a drive."""
     step = np.array([0.0, np.ptp(trajectory.translation_m[:, 1]) + 1.0, 0.0])
     grid = VoxelGrid.around(trajectory, SETTINGS["voxel_size_m"])
     every = np.concatenate([origins + k * step for k in range(copies)])
@@ -72,8 +69,7 @@ def _long(
     def build() -> VoxelMap:
         return build_voxel_map(copied(), every, grid, SETTINGS)
 
-    seconds = cpu_s(build, 1)
-    return seconds, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e9
+    return cpu_s(build, 1)
 
 
 def _row(figure: str, value: float, unit: str, aim: float | None, better: str = "lower") -> dict[str, Any]:
