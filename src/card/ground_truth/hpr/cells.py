@@ -9,9 +9,9 @@ import numpy.typing as npt
 
 from card.ground_truth.compiled import compiled
 
-#: Width of a cell in u and v where points are dense; some five pixels of the left camera. It decides the
+#: Width of a cell in u and v where points are dense; some eight pixels of the left camera. It decides the
 #: time it takes, not the result.
-CELL = 1 / 320
+CELL = 1 / 200
 #: Most cells along an axis. The order of insertion divides each cell by PARTS along each axis: two places of
 #: thirteen bits make one Morton number.
 MAX_CELLS = 1900
