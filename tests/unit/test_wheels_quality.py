@@ -11,11 +11,12 @@ from card.wheels.profile import SplineSettings
 from card.wheels.wheel_fit import Excitation, QualitySettings, fit_excitation
 
 Array = NDArray[np.float64]
+STEP_M = 0.04
 
 
 def excitation(arc: Array, height: Array) -> tuple[Array, Excitation]:
     """Arc lengths and excitation of a wheel that rolls 40 m straight on over points (N,)."""
-    y = np.arange(0, 40, 0.08)
+    y = np.arange(0, 40, STEP_M)
     level = np.tile([1.0, 0, 0, 0], (len(y), 1))
     position = np.stack([np.zeros_like(y), y, np.full_like(y, 1.7)], axis=1)
     path = contact_path(Trajectory(np.arange(len(y)) * 10_000_000, position, level), [0.8, 0.0, -1.7], 0.05)
@@ -42,6 +43,10 @@ def test_points_that_are_sparse_or_disagree_are_uncertain_and_dust_is_not() -> N
     assert stretch["clean"] == stretch["dust"] == 0
     assert stretch["two surfaces"] > 0.5
     assert stretch["rows of points 18 cm apart"] > 0.5
+    # The standard deviation dips at knots, but no sample between doubtful ones of its footprint is certain.
+    between = np.diff(at[wheel.uncertain])
+    assert ((between < STEP_M + 1e-9) | (between >= default_settings("wheels")["footprint_m"])).all()
+    assert (wheel.std_m[wheel.uncertain] < default_settings("wheels")["max_std_m"]).any()
 
 
 PLACES = (

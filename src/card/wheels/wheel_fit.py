@@ -19,7 +19,8 @@ class QualitySettings:
     """When a sample is no good.
 
     With fewer than `gap_min_points` accepted points within `gap_reach_m` along the path it is a gap; with a
-    standard deviation over `max_std_m` it is uncertain. `point_std_m` is that of a point, at the least.
+    standard deviation over `max_std_m`, or between two such samples less than a footprint apart, it is
+    uncertain. `point_std_m` is that of a point, at the least.
     """
 
     gap_reach_m: float
@@ -86,8 +87,24 @@ def fit_excitation(
         found.residual_m,
         std,
         found.points < quality.gap_min_points,
-        std > quality.max_std_m,
+        _closed(std > quality.max_std_m, path, footprint_m),
     )
+
+
+def _closed(uncertain: NDArray[np.bool_], path: ContactPath, footprint_m: float) -> NDArray[np.bool_]:
+    """The uncertain samples (N,) of a path and those between two of them less than a footprint apart.
+
+    The standard deviation has a dip at every knot; the footprint there holds the same doubtful points.
+    """
+    at = np.flatnonzero(uncertain)
+    if len(at) in (0, len(uncertain)):
+        return uncertain
+    following = np.searchsorted(at, np.arange(len(uncertain)))
+    before, after = at[np.maximum(following - 1, 0)], at[np.minimum(following, len(at) - 1)]
+    run = path.run[path.segment]
+    near = (run[before] == run[after]) & (path.arc[after] - path.arc[before] < footprint_m)
+    between = (following > 0) & (following < len(at))
+    return uncertain | (between & near)
 
 
 @dataclass(frozen=True)
