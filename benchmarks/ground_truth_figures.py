@@ -40,8 +40,9 @@ ABLATION: Mapping[str, Mapping[str, Any]] = {
     "literal": {"flow_method": "literal"},
     "submap": {"flow_method": "submap"},
     "votes_alone": dict.fromkeys(NEXT_TO_VOTES, 0),
-    "voxel_15cm": {"voxel_size_m": 0.15},
-    "voxel_20cm": {"voxel_size_m": 0.2},
+    # With the rigidity radius in proportion: the paper's is smaller than the diagonals of these voxels.
+    "voxel_15cm": {"voxel_size_m": 0.15, "rigidity_m": 0.3},
+    "voxel_20cm": {"voxel_size_m": 0.2, "rigidity_m": 0.4},
 }
 #: Those that decide on the points of a frame.
 FRAME_ABLATION: Mapping[str, Mapping[str, Any]] = {
