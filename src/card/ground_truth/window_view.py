@@ -33,6 +33,12 @@ class View(NamedTuple):
 
 
 @compiled
+def _along(axis: Any, vector: Any) -> float:
+    """Component of a vector (3,) along an axis (3,) of float64, summed up in that order."""
+    return axis[0] * vector[0] + axis[1] * vector[1] + axis[2] * vector[2]
+
+
+@compiled
 def look(rows: Rows, view: View, size: float, min_lidars: int, near: Any, box: Any) -> tuple[int, int, int]:
     """List in `near` (V,) the voxels that enough LiDARs hit and that touch the widened field of view.
 
@@ -56,11 +62,7 @@ def look(rows: Rows, view: View, size: float, min_lidars: int, near: Any, box: A
             continue
         redundant += front + rear
         for k in range(3):
-            corner[k] = (
-                rotation[k, 0] * rows.corner[v, 0]
-                + rotation[k, 1] * rows.corner[v, 1]
-                + rotation[k, 2] * rows.corner[v, 2]
-            ) + translation[k]
+            corner[k] = _along(rotation[k], rows.corner[v]) + translation[k]
             box[0, k], box[1, k] = min(box[0, k], corner[k]), max(box[1, k], corner[k])
         z = corner[2] + half[2]
         if z < view.nearest - radius:
@@ -96,10 +98,8 @@ def _pixels(rows: Rows, v: int, view: View, corner: Any, u: Any, w: Any) -> floa
     corner : (3,) of the voxel, camera_left, metres. u, w : (3,) memory.
     """
     turn, mean, spread = view.rotation, rows.mean[v], rows.spread[v]
-    z = corner[2] + (turn[2, 0] * mean[0] + turn[2, 1] * mean[1] + turn[2, 2] * mean[2])
-    z = max(z, view.nearest)
-    x = (corner[0] + (turn[0, 0] * mean[0] + turn[0, 1] * mean[1] + turn[0, 2] * mean[2])) / z
-    y = (corner[1] + (turn[1, 0] * mean[0] + turn[1, 1] * mean[1] + turn[1, 2] * mean[2])) / z
+    z = max(corner[2] + _along(turn[2], mean), view.nearest)
+    x, y = (corner[0] + _along(turn[0], mean)) / z, (corner[1] + _along(turn[1], mean)) / z
     for k in range(3):
         u[k] = (turn[0, k] - x * turn[2, k]) * (view.fx / z)
         w[k] = (turn[1, k] - y * turn[2, k]) * (view.fy / z)
@@ -134,11 +134,7 @@ def emit(
     thinned = in_view = count = 0
     for v in near:
         for k in range(3):
-            corner[k] = (
-                rotation[k, 0] * rows.corner[v, 0]
-                + rotation[k, 1] * rows.corner[v, 1]
-                + rotation[k, 2] * rows.corner[v, 2]
-            ) + translation[k]
+            corner[k] = _along(rotation[k], rows.corner[v]) + translation[k]
         total = rows.left[v]
         share = total
         if pixels_per_point > 0:
@@ -156,14 +152,9 @@ def emit(
                 if not stays:
                     continue
                 thinned += 1
-                a, b, c = (
-                    np.float64(rows.offset[at, 0]),
-                    np.float64(rows.offset[at, 1]),
-                    np.float64(rows.offset[at, 2]),
-                )
-                x = corner[0] + (rotation[0, 0] * a + rotation[0, 1] * b + rotation[0, 2] * c)
-                y = corner[1] + (rotation[1, 0] * a + rotation[1, 1] * b + rotation[1, 2] * c)
-                z = corner[2] + (rotation[2, 0] * a + rotation[2, 1] * b + rotation[2, 2] * c)
+                x = corner[0] + _along(rotation[0], rows.offset[at])
+                y = corner[1] + _along(rotation[1], rows.offset[at])
+                z = corner[2] + _along(rotation[2], rows.offset[at])
                 if z < view.nearest or x < view.low[0] * z or x > view.high[0] * z:
                     continue
                 if y < view.low[1] * z or y > view.high[1] * z:

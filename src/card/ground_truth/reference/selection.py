@@ -55,13 +55,12 @@ def select(
     )
     kept = kept[clean]
     counts["points_clean"] = len(kept)
-    image = camera.undistorted
-    covered = pixels_covered(
-        cloud.voxel[kept], cloud.offset[kept], corners, matrix[:3, :3], (image.fx, image.fy), nearest
-    )
+    inliers = kept
     if settings["points_per_voxel"]:
         kept = kept[thin(cloud.voxel[kept], np.full(len(corners), settings["points_per_voxel"]))]
     if settings["pixels_per_point"]:
+        own, focal_px = cloud.voxel[inliers], (camera.undistorted.fx, camera.undistorted.fy)
+        covered = pixels_covered(own, cloud.offset[inliers], corners, matrix[:3, :3], focal_px, nearest)
         limit = np.maximum((covered / settings["pixels_per_point"]).astype(np.int64), 1)
         # Front LiDAR first, each in order of time.
         kept = kept[np.argsort(~cloud.front[kept], kind="stable")]
